@@ -26,14 +26,14 @@
 //! |---|---|---|---|
 //! | [`AllSamples`] | [`NearestNeighbor`] | [`MaxDistance`] | [`ConstantWeight`] |
 //! | [`VisibleSurface`] | [`KNearest`] | [`MaxNormalAngle`] | [`DistanceWeight`] |
-//! | [`ObservedSurface`] | [`NormalCompatible`] | [`MedianDistance`] | [`NormalWeight`] |
-//! | [`WithoutBoundary`] | [`NormalShooting`] | [`MadDistance`] | [`SensorNoiseWeight`] |
-//! | [`UniformCount`] | [`Reciprocal`] | [`Trimmed`] | |
-//! | [`RandomSample`] | [`Projective`] | [`VarTrimmed`] | |
-//! | [`VoxelGrid`] | [`ProjectiveSearch`] | [`OneToOne`] | |
-//! | [`NormalSpace`] | [`ProjectiveInterpolated`] | [`BoundaryTargets`] | |
-//! | [`StableSampling`] | [`ObservationToModel`] | [`MinPairs`] | |
-//! | | [`ClosestPointOnMesh`] | | |
+//! | [`VisibleSide`] | [`NormalCompatible`] | [`MedianDistance`] | [`NormalWeight`] |
+//! | [`ObservedSurface`] | [`NormalShooting`] | [`MadDistance`] | [`SensorNoiseWeight`] |
+//! | [`WithoutBoundary`] | [`Reciprocal`] | [`Trimmed`] | |
+//! | [`UniformCount`] | [`Projective`] | [`VarTrimmed`] | |
+//! | [`RandomSample`] | [`ProjectiveSearch`] | [`OneToOne`] | |
+//! | [`VoxelGrid`] | [`ProjectiveInterpolated`] | [`BoundaryTargets`] | |
+//! | [`NormalSpace`] | [`ObservationToModel`] | [`MinPairs`] | |
+//! | [`StableSampling`] | [`ClosestPointOnMesh`] | | |
 //! | | [`RenderedSurface`] | | |
 //! | | [`Contour`] | | |
 //!

@@ -54,6 +54,7 @@ pub use object::mesh::{Facing, MAX_COORDINATE_METERS, MAX_MESH_ELEMENTS, MeshErr
 pub use object::mesh_survey::MeshSurvey;
 pub use object::model::{Model, ModelConfig};
 pub use object::sampling::{MAX_SAMPLES, sample_colored_surface, sample_surface};
+pub use object::sides::{Side, Sides};
 pub use object::surface_color::{SurfaceColor, TexturedTriangle};
 pub use object::symmetry::{
     CONTINUOUS_STEPS, MAX_SYMMETRY_MOTIONS, Symmetries, SymmetryAxis, SymmetryError,

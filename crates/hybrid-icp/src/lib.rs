@@ -46,7 +46,7 @@
 //!
 //! | role | trait | what ships | example |
 //! |---|---|---|---|
-//! | points to register | [`PointSelection`](association::PointSelection) | [`AllSamples`](association::AllSamples), [`VisibleSurface`](association::VisibleSurface), [`StableSampling`](association::StableSampling), … | `09_own_selection` |
+//! | points to register | [`PointSelection`](association::PointSelection) | [`AllSamples`](association::AllSamples), [`VisibleSurface`](association::VisibleSurface), [`VisibleSide`](association::VisibleSide), [`StableSampling`](association::StableSampling), … | `09_own_selection` |
 //! | which points belong together | [`DataAssociation`](association::DataAssociation) | [`NearestNeighbor`](association::NearestNeighbor), [`Projective`](association::Projective), [`ObservationToModel`](association::ObservationToModel), [`RenderedSurface`](association::RenderedSurface), [`Contour`](association::Contour), … | `05_own_association` |
 //! | which pairs count | [`OutlierFilter`](association::OutlierFilter) | [`MaxDistance`](association::MaxDistance), [`MaxNormalAngle`](association::MaxNormalAngle), [`Trimmed`](association::Trimmed), … | `10_own_filter` |
 //! | error of a pair | [`ErrorMetric`](metric::ErrorMetric) | [`PointToPoint`](metric::PointToPoint), [`PointToPlane`](metric::PointToPlane), [`Symmetric`](metric::Symmetric), [`Generalized`](metric::Generalized), … | `06_own_metric` |

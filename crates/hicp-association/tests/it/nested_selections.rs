@@ -10,7 +10,7 @@ use crate::common::{
 };
 use hicp_association::{
     AllSamples, Length, NormalSpace, ObservedSurface, PointSelection, RandomSample, StableSampling,
-    Stride, UniformCount, VisibleSurface, VoxelGrid, WithoutBoundary,
+    Stride, UniformCount, VisibleSide, VisibleSurface, VoxelGrid, WithoutBoundary,
 };
 use hicp_core::{
     Context, Isometry3, Matrix6, Point3, RenderCache, Surfel, UnitVector3, Vector3, Vector6,
@@ -21,6 +21,7 @@ fn all_selections() -> Vec<Box<dyn PointSelection>> {
     vec![
         Box::new(AllSamples),
         Box::new(VisibleSurface::default()),
+        Box::new(VisibleSide { count: 100 }),
         Box::new(ObservedSurface::default()),
         Box::new(UniformCount {
             inner: VisibleSurface::default(),

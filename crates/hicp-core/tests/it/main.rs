@@ -29,6 +29,7 @@ mod observation;
 mod render;
 mod rotation;
 mod se3;
+mod sides;
 mod so3;
 mod support;
 mod symmetry;

@@ -32,8 +32,14 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_score("sampled-mve", |p| {
         p.about = "Computes the MVE at low resolution from points of the model instead of a \
             render, for ranking many poses. Cost: O(samples), whatever the mesh.";
-        let samples = p.limited(Samples, "samples", 0, 1500, "points on the model")?;
-        let pixels = p.count("pixels", 1, 200, "pixels of the mask, about")?;
+        let samples = p.limited(
+            Samples,
+            "samples",
+            0,
+            600,
+            "points of a side of the model, about",
+        )?;
+        let pixels = p.count("pixels", 1, 150, "pixels of the mask, about")?;
         let mut score = SampledMve::new(samples, pixels);
         let tolerance = p.number("occlusion_tolerance", TOLERANCE, 0.015, HIDES)?;
         score.occlusion = Occlusion::from_tolerance(tolerance);

@@ -2,13 +2,14 @@
 
 use hicp_association::{
     AllSamples, NormalSpace, ObservedSurface, RandomSample, SelectAt, StableSampling, UniformCount,
-    VisibleSurface, VoxelGrid, WithoutBoundary,
+    VisibleSide, VisibleSurface, VoxelGrid, WithoutBoundary,
 };
 
 use super::common::{EDGE, TILT, length, stride};
 use crate::build::Parameters;
 use crate::catalog::{BoxedSelection, Catalog};
 use crate::error::PipelineError;
+use crate::work::Limited::Samples;
 
 pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_selection("all-samples", |p| {
@@ -28,6 +29,12 @@ pub(super) fn add(catalog: &mut Catalog) {
         let poses = [("stage", SelectAt::Stage), ("cascade", SelectAt::Cascade)];
         let at = p.word("at", &poses, "whose initial estimate")?;
         Ok(VisibleSurface { stride, at })
+    });
+    catalog.add_selection("visible-side", |p| {
+        p.about = "Selects what is seen of the model from the nearest of 96 sides, spread evenly \
+            over the image. For many poses at low cost. Cost: O(samples), no render.";
+        let count = p.limited(Samples, "samples", 0, 100, "points of a side, about")?;
+        Ok(VisibleSide { count })
     });
     catalog.add_selection("observed-surface", |p| {
         p.about = "Selects the observed surface, moved into the object frame at the stage's \

@@ -7,7 +7,7 @@ pub(crate) mod mask_trust;
 pub(crate) mod mean_vsd;
 pub(crate) mod occlusion;
 pub(crate) mod sampled_mve;
-pub(crate) mod splat;
+mod splat;
 pub(crate) mod surfaces;
 pub(crate) mod trust_map;
 

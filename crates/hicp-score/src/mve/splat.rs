@@ -1,72 +1,58 @@
-//! Samples of a model, drawn into a coarse depth buffer.
+//! Points of a model, drawn into a coarse depth buffer.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use hicp_core::internal::{VectorLoop, whole};
-use hicp_core::{Isometry3, Model, PinholeCamera, Surfel, sample_surface};
+use hicp_core::{Isometry3, Model, PinholeCamera, Sides, Surfel};
 
 use crate::mve::coarse_grid::PADDING;
 
-/// Number of samples projected at once.
+/// Number of points projected at once.
 const LANES: usize = PADDING;
 
-/// Points and normals of some samples, by coordinate.
-///
-/// The last ones are padded with points that are not numbers. Neighbors have similar normals, so
-/// that many blocks face away with all their samples.
-struct Block {
+/// Points by coordinate, object frame. The last ones are padded with points that are not numbers.
+pub(crate) struct Block {
     points: [[f32; LANES]; 3],
-    normals: [[f32; LANES]; 3],
-}
-
-/// The samples of a model.
-pub(crate) struct Samples {
-    blocks: Vec<Block>,
-    /// `true` if normals are certain to point out of the object.
-    oriented: bool,
-}
-
-impl Samples {
-    /// Returns the samples of a model. They are computed once and shared.
-    pub(crate) fn of(model: &Model, samples: usize) -> Arc<Self> {
-        model.derived().get_or_build(samples as u64, || {
-            let mut surfels = sample_surface(model.mesh(), samples);
-            surfels.sort_by_key(direction);
-            Self {
-                blocks: surfels.chunks(LANES).map(Block::new).collect(),
-                oriented: model.mesh().is_closed(),
-            }
-        })
-    }
-}
-
-/// Returns a number that is similar for similar normals: a cell on a cube around the origin.
-fn direction(surfel: &Surfel) -> (usize, bool, [i32; 2]) {
-    let normal = surfel.normal;
-    let axis = normal.iamax();
-    #[allow(clippy::cast_possible_truncation)] // From −2 to 2.
-    let cell = |step: usize| (2.9 * normal[(axis + step) % 3] / normal[axis].abs()) as i32;
-    (axis, normal[axis] > 0.0, [cell(1), cell(2)])
 }
 
 impl Block {
     fn new(surfels: &[Surfel]) -> Self {
         let mut block = Self {
             points: [[f32::NAN; LANES]; 3],
-            normals: [[0.0; LANES]; 3],
         };
         for (lane, surfel) in surfels.iter().enumerate() {
             for axis in 0..3 {
                 block.points[axis][lane] = surfel.point[axis];
-                block.normals[axis][lane] = surfel.normal[axis];
             }
         }
         block
     }
 }
 
-/// The pixels of a block of samples, and the inverse depths there.
+/// The points of the sides of a model, in blocks.
+pub(crate) struct Blocks {
+    sides: Arc<Sides>,
+    blocks: [OnceLock<Vec<Block>>; Sides::COUNT],
+}
+
+impl Blocks {
+    /// Returns the blocks of a model with about `count` points per side. They are shared.
+    pub(crate) fn of(model: &Model, count: usize) -> Arc<Self> {
+        model.derived().get_or_build(count as u64, || Self {
+            sides: Sides::of(model, count),
+            blocks: [const { OnceLock::new() }; Sides::COUNT],
+        })
+    }
+
+    /// Returns the points of the side that faces the camera at a pose.
+    pub(crate) fn facing(&self, camera_from_object: &Isometry3<f64>) -> &[Block] {
+        let side = self.sides.facing(camera_from_object);
+        self.blocks[side.index].get_or_init(|| side.surfels.chunks(LANES).map(Block::new).collect())
+    }
+}
+
+/// The pixels of a block of points, and the inverse depths there.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Drawn {
     pixels: [u32; LANES],
@@ -110,14 +96,14 @@ impl Extent {
     }
 }
 
-/// The loop that writes the nearest sample of every pixel.
+/// The loop that writes the nearest point of every pixel.
 ///
 /// It returns the columns and rows of a rectangle that contains the written pixels.
 ///
-/// It has no branches: whether a sample is the nearest of its pixel is as good as random. Samples
+/// It has no branches: whether a point is the nearest of its pixel is as good as random. Points
 /// outside the image write zeros below its last row, where no write waits for another.
 pub(crate) struct Splat<'a> {
-    pub(crate) samples: &'a Samples,
+    pub(crate) blocks: &'a [Block],
     pub(crate) camera: &'a PinholeCamera,
     pub(crate) pose: &'a Isometry3<f64>,
     /// The pixels of the image, and [`PADDING`] more.
@@ -138,25 +124,13 @@ impl VectorLoop for Splat<'_> {
         let (width, height) = (camera.width() as f32, camera.height() as f32);
         let stride = camera.width();
         let (mut columns, mut rows) = (Extent::EMPTY, Extent::EMPTY);
-        let eye = self.pose.inverse().translation.vector.cast::<f32>();
         let pose: Isometry3<f32> = self.pose.cast();
         let rotation = pose.rotation.to_rotation_matrix();
         let shift = pose.translation.vector;
-        // No number is at or above NaN.
-        let limit = if self.samples.oriented { 0.0 } else { f32::NAN };
         self.drawn.clear();
-        self.drawn.reserve(self.samples.blocks.len());
-        for block in &self.samples.blocks {
-            let ([x, y, z], [a, b, c]) = (&block.points, &block.normals);
-            let mut away = [0.0; LANES];
-            for lane in 0..LANES {
-                away[lane] = a[lane] * (x[lane] - eye.x)
-                    + b[lane] * (y[lane] - eye.y)
-                    + c[lane] * (z[lane] - eye.z);
-            }
-            if away.iter().all(|away| *away >= limit) {
-                continue;
-            }
+        self.drawn.reserve(self.blocks.len());
+        for block in self.blocks {
+            let [x, y, z] = &block.points;
             let mut drawn = Drawn {
                 pixels: [0; LANES],
                 inverses: [0.0; LANES],
@@ -174,14 +148,9 @@ impl VectorLoop for Splat<'_> {
                 let inverse = 1.0 / depth;
                 let u = fx * moved(0) * inverse + cx + 0.5;
                 let v = fy * moved(1) * inverse + cy + 0.5;
-                let faces_away = away[lane] >= limit;
                 // False for NaN.
-                let inside = (depth > f32::EPSILON)
-                    & (u >= 0.0)
-                    & (v >= 0.0)
-                    & (u < width)
-                    & (v < height)
-                    & !faces_away;
+                let inside =
+                    (depth > f32::EPSILON) & (u >= 0.0) & (v >= 0.0) & (u < width) & (v < height);
                 let choose = |one: f32, other: f32| if inside { one } else { other };
                 drawn.inverses[lane] = choose(inverse, 0.0);
                 (left[lane], right[lane]) = (choose(u, f32::INFINITY), choose(u, 0.0));

@@ -15,7 +15,7 @@ use hybrid_icp::association::{
     NormalCompatible, NormalShooting, NormalSpace, NormalWeight, ObservationToModel,
     ObservedSurface, OneToOne, Projective, ProjectiveInterpolated, ProjectiveSearch, RandomSample,
     Reciprocal, RenderedSurface, Schedule, SearchIndex, SensorNoiseWeight, StableSampling, Stride,
-    Trimmed, UniformCount, VarTrimmed, VisibleSurface, VoxelGrid, WithoutBoundary,
+    Trimmed, UniformCount, VarTrimmed, VisibleSide, VisibleSurface, VoxelGrid, WithoutBoundary,
 };
 use hybrid_icp::core::Matrix6;
 use hybrid_icp::icp::{
@@ -35,6 +35,7 @@ use hybrid_icp::switch::{PAPER_ALPHA, SwitchUntilStall, Threshold, Thresholds};
 fn built_in_selections_keep_the_laws() {
     check_selection(|| AllSamples);
     check_selection(VisibleSurface::default);
+    check_selection(|| VisibleSide { count: 200 });
     check_selection(ObservedSurface::default);
     check_selection(WithoutBoundary::default);
     check_selection(UniformCount::default);

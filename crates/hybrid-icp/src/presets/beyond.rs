@@ -7,7 +7,7 @@
 
 use hicp_association::{
     AllSamples, Contour, Length, MaxDistance, MaxNormalAngle, NearestNeighbor, ObservationToModel,
-    Projective, RenderedSurface, Stride, UniformCount, VisibleSurface,
+    Projective, RenderedSurface, Stride, VisibleSide, VisibleSurface,
 };
 use hicp_icp::{
     Cascade, ColorChoice, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp,
@@ -51,7 +51,7 @@ pub type Local = Cascade<(
     Switch<Threshold<Doubt>, Cascade<()>, Cascade<(Guard<Fit, MeanVsd>, Steps)>>,
 )>;
 /// The stage that aligns hypotheses.
-pub type Align = Icp<UniformCount<AllSamples>, Projective, MaxDistance, Symmetric, PaperStop>;
+pub type Align = Icp<VisibleSide, Projective, MaxDistance, Symmetric, PaperStop>;
 /// The stage that refines hypotheses.
 pub type Explore = Descent<SampledMve>;
 /// The type of [`by_color`].
@@ -228,27 +228,15 @@ pub fn local() -> Local {
     ))
 }
 
-/// Creates the score that ranks hypotheses.
-fn ranking() -> SampledMve {
-    let mut score = SampledMve::imperfect_mask();
-    (score.samples, score.pixels) = (800, 150);
-    score
-}
-
 /// Creates the count of poses that look alike, by the scores of the search.
 pub(crate) fn look_alikes() -> LookAlikeCount<SampledMve, MeanVsd> {
-    LookAlikeCount::new(ranking(), MeanVsd::imperfect_mask())
+    LookAlikeCount::new(SampledMve::imperfect_mask(), MeanVsd::imperfect_mask())
 }
 
 /// Creates the stage that moves many hypotheses to the image: few points, and no render.
-///
-/// Points of the far side are paired, too, but the symmetric metric skips them by their normals.
 fn align() -> Align {
     Icp {
-        selection: UniformCount {
-            inner: AllSamples,
-            count: 200,
-        },
+        selection: VisibleSide { count: 100 },
         association: Projective,
         filter: MaxDistance::diameters(TAU_DIAMETERS),
         metric: Symmetric,
@@ -259,7 +247,7 @@ fn align() -> Align {
 /// Creates the stage that refines hypotheses. It lowers the ranking score directly.
 fn explore() -> Explore {
     Descent {
-        score: ranking(),
+        score: SampledMve::imperfect_mask(),
         good_enough: 0.0,
         first_step: 0.1,
         last_step: 0.0125,
@@ -273,7 +261,11 @@ fn search_from<S>(
     stage: S,
     options: SearchOptions,
 ) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd, Doubt> {
-    let scores = (ranking(), MeanVsd::imperfect_mask(), Doubt);
+    let scores = (
+        SampledMve::imperfect_mask(),
+        MeanVsd::imperfect_mask(),
+        Doubt,
+    );
     HypothesisSearch::new(stage, align(), explore(), scores, options)
 }
 

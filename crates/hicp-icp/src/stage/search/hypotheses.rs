@@ -1,7 +1,9 @@
 //! Hypotheses of a search: poses with rotations from a set, placed at the observed points.
 
+use std::sync::Arc;
+
 use hicp_core::{
-    Isometry3, Model, Observation, Point3, Problem, Surfel, Translation3, UnitQuaternion,
+    Isometry3, Model, Observation, Point3, Problem, Sides, Translation3, UnitQuaternion,
     UnitVector3, Vector3, rotation_grid, se3, so3,
 };
 
@@ -22,8 +24,8 @@ pub enum Rotations {
     Symmetry,
 }
 
-/// Number of model points that determine the place of a hypothesis.
-const PLACING_SAMPLES: usize = 250;
+/// Number of surfels of a side that determine the place of a hypothesis.
+const PLACING_SURFELS: usize = 600;
 
 /// The source of the hypotheses of one search.
 pub(crate) struct Hypotheses<'a> {
@@ -34,7 +36,7 @@ pub(crate) struct Hypotheses<'a> {
     centroid: Point3<f64>,
     /// Direction from the camera to the centroid.
     ray: Vector3<f64>,
-    oriented: bool,
+    sides: Arc<Sides>,
 }
 
 impl<'a> Hypotheses<'a> {
@@ -53,7 +55,7 @@ impl<'a> Hypotheses<'a> {
             bound,
             centroid,
             ray,
-            oriented: model.mesh().is_closed(),
+            sides: Sides::of(model, PLACING_SURFELS),
         })
     }
 
@@ -166,7 +168,11 @@ impl<'a> Hypotheses<'a> {
                 return None;
             }
         }
-        let mut translation = self.centroid - rotation * self.shown(rotation);
+        let seen = self
+            .sides
+            .toward(&(rotation.inverse() * -self.ray))
+            .centroid;
+        let mut translation = self.centroid - rotation * seen;
         if let Some(bound) = self.bound {
             let initial = self.init.translation.vector;
             let step = translation - initial;
@@ -179,31 +185,6 @@ impl<'a> Hypotheses<'a> {
             Translation3::from(translation),
             *rotation,
         ))
-    }
-
-    /// Returns the centroid of the surface that faces the camera, in the object frame.
-    ///
-    /// Points are weighted by their visible area.
-    fn shown(&self, rotation: &UnitQuaternion<f64>) -> Point3<f64> {
-        let samples = self.model.samples();
-        let toward = rotation.inverse() * self.ray;
-        let step = samples.len().div_ceil(PLACING_SAMPLES).max(1);
-        let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
-        for Surfel { point, normal } in samples.iter().step_by(step) {
-            let facing = -normal.cast::<f64>().dot(&toward);
-            let weight = if self.oriented {
-                facing.max(0.0)
-            } else {
-                facing.abs()
-            };
-            sum += point.coords.cast::<f64>() * weight;
-            weights += weight;
-        }
-        if weights > 0.0 {
-            Point3::from(sum / weights)
-        } else {
-            self.model.center()
-        }
     }
 }
 

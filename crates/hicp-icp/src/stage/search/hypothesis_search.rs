@@ -248,6 +248,11 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
                 continue;
             }
             self.explored.push(*start);
+            if !ends {
+                // A look-alike of a pose that fits may fit as it is.
+                let start = Outcome::refined(*start, Termination::Converged);
+                self.add(run, start, false);
+            }
             let outcome = run.refine(&mut self.explore, start);
             // A hypothesis that the stage keeps is still another pose than the initial one.
             let verdict = Verdict::Refined;

@@ -1,0 +1,211 @@
+//! The surface that is seen from each side of an object.
+
+use std::sync::{Arc, OnceLock};
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
+
+use crate::object::model::Model;
+use crate::object::sampling::{MAX_SAMPLES, sample_surface};
+use crate::surfel::Surfel;
+
+/// Number of surface samples per surfel of a side, from which the surfels are chosen.
+const DENSITY: usize = 16;
+/// Number of cells along the longer axis of a view, to measure its area.
+const COARSE: f32 = 24.0;
+/// Depth behind the foremost sample of a cell up to which a sample may be chosen, as a share of the
+/// diameter.
+const FRONT: f32 = 0.05;
+
+/// The visible surfels of a model from [`Sides::COUNT`] sides.
+///
+/// They stand in for a render where thousands of poses are tried. The surfels of a side are spread
+/// evenly over the *image* of the object, from far away: a square grid covers the view, and each
+/// cell has one. So fewer of them leave a pixel empty than samples that are spread over the
+/// surface. Surfels behind other parts of the object are left out, such as the inside of a mug.
+///
+/// ```
+/// use hicp_core::{Isometry3, Model, Point3, Sides, TriMesh};
+/// # fn main() -> Result<(), hicp_core::MeshError> {
+/// let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]].map(Point3::from);
+/// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
+/// let side = Sides::of(&model, 200).facing(&Isometry3::translation(0.0, 0.0, 1.0)).surfels.len();
+/// assert!((150..250).contains(&side));
+/// # Ok(()) }
+/// ```
+#[derive(Debug)]
+pub struct Sides {
+    samples: Vec<Surfel>,
+    center: Point3<f64>,
+    diameter: f32,
+    /// `true` if normals are certain to point out of the object.
+    oriented: bool,
+    count: usize,
+    /// The directions to the sides, object frame, and the sides once they are asked for.
+    sides: [(UnitVector3<f32>, OnceLock<Side>); Self::COUNT],
+}
+
+/// The surface of a model that is seen from one of its sides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Side {
+    /// The number of the side, below [`Sides::COUNT`].
+    pub index: usize,
+    /// The visible surfels, object frame.
+    pub surfels: Vec<Surfel>,
+    /// The mean of their points; the center of the model if there is none.
+    pub centroid: Point3<f64>,
+}
+
+impl Sides {
+    /// Number of sides. Neighbors are some 20° apart.
+    pub const COUNT: usize = 96;
+
+    /// Returns the sides of a model with about `count` surfels each. They are shared.
+    ///
+    /// Cost: sampling the surface once, and some 0.1 ms for each side that is asked for.
+    #[must_use]
+    pub fn of(model: &Model, count: usize) -> Arc<Self> {
+        let count = count.min(MAX_SAMPLES / DENSITY);
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of samples.
+        model.derived().get_or_build(count as u64, || Self {
+            samples: sample_surface(model.mesh(), DENSITY * count),
+            center: model.center(),
+            diameter: model.diameter() as f32,
+            oriented: model.mesh().is_closed(),
+            count,
+            sides: std::array::from_fn(|side| (direction(side), OnceLock::new())),
+        })
+    }
+
+    /// Returns the side that faces the camera at a pose.
+    #[must_use]
+    pub fn facing(&self, camera_from_object: &Isometry3<f64>) -> &Side {
+        let eye = camera_from_object.inverse().translation.vector;
+        self.toward(&(eye - self.center.coords))
+    }
+
+    /// Returns the side in a direction from the center, object frame, of any length.
+    #[must_use]
+    pub fn toward(&self, direction: &Vector3<f64>) -> &Side {
+        let direction = direction.cast::<f32>();
+        let (mut nearest, mut most) = (0, f32::NEG_INFINITY);
+        for (index, (side, _)) in self.sides.iter().enumerate() {
+            let along = side.dot(&direction);
+            if along > most {
+                (nearest, most) = (index, along);
+            }
+        }
+        let (direction, side) = &self.sides[nearest];
+        side.get_or_init(|| {
+            let surfels = self.seen_from(direction);
+            let sum = (surfels.iter()).fold(Vector3::zeros(), |sum: Vector3<f64>, surfel| {
+                sum + surfel.point.coords.cast::<f64>()
+            });
+            let centroid = match surfels.len() {
+                0 => self.center,
+                count => Point3::from(sum / count as f64),
+            };
+            Side {
+                index: nearest,
+                surfels,
+                centroid,
+            }
+        })
+    }
+
+    /// Returns surfels that are seen from a direction.
+    fn seen_from(&self, direction: &UnitVector3<f32>) -> Vec<Surfel> {
+        let turn = UnitQuaternion::rotation_between_axis(direction, &Vector3::z_axis())
+            .unwrap_or_else(|| {
+                UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f32::consts::PI)
+            });
+        let faces = |s: &&Surfel| !self.oriented || s.normal.dot(direction) > 0.0;
+        let facing = self.samples.iter().filter(faces);
+        let seen: Vec<Seen> = facing
+            .map(|sample| Seen {
+                place: turn * sample.point.coords,
+                surfel: *sample,
+            })
+            .collect();
+        let infinity = Vector3::repeat(f32::INFINITY);
+        let low = seen.iter().fold(infinity, |low, s| low.inf(&s.place));
+        let high = seen.iter().fold(-infinity, |high, s| high.sup(&s.place));
+        let longer = (high - low).xy().max();
+        if longer.is_nan() || longer <= 0.0 {
+            return seen.first().map(|seen| seen.surfel).into_iter().collect();
+        }
+        let grid = |cell| Grid::new(low, high, cell);
+        let coarse = grid(longer / COARSE);
+        let area = coarse.choose(&seen, 0.0).len() as f32 * coarse.cell.powi(2);
+        let fine = grid((area / self.count as f32).sqrt());
+        fine.choose(&seen, FRONT * self.diameter)
+    }
+}
+
+/// Returns the direction to a side. They are even on a sphere: a Fibonacci lattice.
+fn direction(side: usize) -> UnitVector3<f32> {
+    let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let z = 1.0 - (2 * side + 1) as f64 / Sides::COUNT as f64;
+    let (sin, cos) = (golden_angle * side as f64).sin_cos();
+    let radius = (1.0 - z * z).sqrt();
+    UnitVector3::new_normalize(Vector3::new(radius * cos, radius * sin, z).cast())
+}
+
+/// A sample in a view along its z axis, toward the eye.
+struct Seen {
+    place: Vector3<f32>,
+    /// Object frame.
+    surfel: Surfel,
+}
+
+/// A grid of square cells over a view.
+struct Grid {
+    low: Vector3<f32>,
+    cell: f32,
+    columns: usize,
+    rows: usize,
+}
+
+impl Grid {
+    fn new(low: Vector3<f32>, high: Vector3<f32>, cell: f32) -> Self {
+        let cells = |axis: usize| whole((high[axis] - low[axis]) / cell) + 1;
+        Self {
+            low,
+            cell,
+            columns: cells(0),
+            rows: cells(1),
+        }
+    }
+
+    /// Returns the cell of a place, and how far the place is from the middle.
+    fn cell(&self, place: &Vector3<f32>) -> (usize, f32) {
+        let [x, y] = [0, 1].map(|axis| (place[axis] - self.low[axis]) / self.cell);
+        let (column, row) = (whole(x).min(self.columns - 1), whole(y).min(self.rows - 1));
+        let off = (x - x.floor() - 0.5).powi(2) + (y - y.floor() - 0.5).powi(2);
+        (row * self.columns + column, off)
+    }
+
+    /// Returns one surfel per occupied cell: of those at most `front` behind the foremost one, the
+    /// nearest to the middle.
+    fn choose(&self, seen: &[Seen], front: f32) -> Vec<Surfel> {
+        let mut foremost = vec![f32::NEG_INFINITY; self.columns * self.rows];
+        for Seen { place, .. } in seen {
+            let foremost = &mut foremost[self.cell(place).0];
+            *foremost = foremost.max(place.z);
+        }
+        let mut chosen: Vec<Option<(f32, Surfel)>> = vec![None; foremost.len()];
+        for Seen { place, surfel } in seen {
+            let (cell, off) = self.cell(place);
+            let in_front = place.z >= foremost[cell] - front;
+            if in_front && chosen[cell].is_none_or(|(least, _)| off < least) {
+                chosen[cell] = Some((off, *surfel));
+            }
+        }
+        chosen.into_iter().flatten().map(|(_, s)| s).collect()
+    }
+}
+
+/// Returns the whole part of a number that is not negative.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A cell of a grid.
+fn whole(number: f32) -> usize {
+    number as usize
+}
