@@ -5,13 +5,19 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 use crate::object::model::Model;
-use crate::object::sampling::{MAX_SAMPLES, sample_surface};
+use crate::object::sampling::sample_surface;
 use crate::surfel::Surfel;
 
 /// Number of surface samples per surfel of a side, from which the surfels are chosen.
 const DENSITY: usize = 16;
+/// Largest number of surfels of a side.
+const MAX_SURFELS: usize = 100_000;
 /// Number of cells along the longer axis of a view, to measure its area.
 const COARSE: f32 = 24.0;
+/// Largest number of cells per surfel. Two specks far apart would need more.
+const MAX_CELLS: f32 = 64.0;
+/// Length of a view that is too short for cells, meters.
+const SPECK: f32 = 1e-9;
 /// Depth behind the foremost sample of a cell up to which a sample may be chosen, as a share of the
 /// diameter.
 const FRONT: f32 = 0.05;
@@ -59,12 +65,13 @@ impl Sides {
     /// Number of sides. Neighbors are some 20° apart.
     pub const COUNT: usize = 96;
 
-    /// Returns the sides of a model with about `count` surfels each. They are shared.
+    /// Returns the sides of a model with about `count` surfels each, at most 100,000. They are
+    /// shared.
     ///
     /// Cost: sampling the surface once, and some 0.1 ms for each side that is asked for.
     #[must_use]
     pub fn of(model: &Model, count: usize) -> Arc<Self> {
-        let count = count.min(MAX_SAMPLES / DENSITY);
+        let count = count.min(MAX_SURFELS);
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of samples.
         model.derived().get_or_build(count as u64, || Self {
             samples: sample_surface(model.mesh(), DENSITY * count),
@@ -130,13 +137,15 @@ impl Sides {
         let low = seen.iter().fold(infinity, |low, s| low.inf(&s.place));
         let high = seen.iter().fold(-infinity, |high, s| high.sup(&s.place));
         let longer = (high - low).xy().max();
-        if longer.is_nan() || longer <= 0.0 {
+        if longer.is_nan() || longer <= SPECK {
             return seen.first().map(|seen| seen.surfel).into_iter().collect();
         }
         let grid = |cell| Grid::new(low, high, cell);
         let coarse = grid(longer / COARSE);
         let area = coarse.choose(&seen, 0.0).len() as f32 * coarse.cell.powi(2);
-        let fine = grid((area / self.count as f32).sqrt());
+        let count = self.count as f32;
+        let smallest = longer / (MAX_CELLS * count).sqrt();
+        let fine = grid((area / count).sqrt().max(smallest));
         fine.choose(&seen, FRONT * self.diameter)
     }
 }

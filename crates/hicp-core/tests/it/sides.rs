@@ -89,3 +89,26 @@ fn the_side_at_a_pose_is_the_one_toward_the_camera() {
     assert_eq!(sides.facing(&lost).index, 0);
     assert!(Sides::of(&model, 0).facing(&pose).surfels.is_empty());
 }
+
+/// Neither tiny objects nor specks that are far apart need much memory, or panic.
+#[test]
+fn extreme_models_have_sides() {
+    let triangle = |at: f32, size: f32| {
+        [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[x, y]| Point3::new(at + size * x, size * y, 0.0))
+    };
+    let toward = Vector3::z();
+    let tiny = TriMesh::new(triangle(0.0, 1e-20).to_vec(), vec![[0, 1, 2]]);
+    if let Ok(tiny) = tiny {
+        assert!(
+            Sides::of(&Model::new(tiny), 100)
+                .toward(&toward)
+                .surfels
+                .len()
+                <= 1
+        );
+    }
+    let specks = [triangle(0.0, 1e-4), triangle(10.0, 1e-4)].concat();
+    let specks = Model::new(TriMesh::new(specks, vec![[0, 1, 2], [3, 4, 5]]).unwrap());
+    let count = Sides::of(&specks, usize::MAX).toward(&toward).surfels.len();
+    assert!((2..100_000).contains(&count), "{count}");
+}
