@@ -7,7 +7,7 @@ use crate::selection::point_selection::PointSelection;
 /// Selects what is seen of the model from the side that faces the camera at the current estimate,
 /// without a render ([`Sides`]).
 ///
-/// The surfels are spread evenly over the image. The side is up to 15° away, so some may be hidden.
+/// The surfels are spread evenly over the image. The side is up to 20° away, so some may be hidden.
 /// It fits many alignments at low cost; [`VisibleSurface`](crate::VisibleSurface) is exact. A cloud
 /// has no sides. Cost: a copy of the surfels, and some 0.1 ms for the first pose of a side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -62,8 +62,8 @@ pub struct Side {
 }
 
 impl Sides {
-    /// Number of sides. Neighbors are some 20° apart.
-    pub const COUNT: usize = 96;
+    /// Number of sides. Neighbors are some 30° apart.
+    pub const COUNT: usize = 48;
 
     /// Returns the sides of a model with about `count` surfels each, at most 100,000. They are
     /// shared.
@@ -124,28 +124,39 @@ impl Sides {
         let turn = UnitQuaternion::rotation_between_axis(direction, &Vector3::z_axis())
             .unwrap_or_else(|| {
                 UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f32::consts::PI)
-            });
+            })
+            .to_rotation_matrix();
         let faces = |s: &&Surfel| !self.oriented || s.normal.dot(direction) > 0.0;
         let facing = self.samples.iter().filter(faces);
-        let seen: Vec<Seen> = facing
-            .map(|sample| Seen {
-                place: turn * sample.point.coords,
-                surfel: *sample,
-            })
+        let seen: Vec<(Vector3<f32>, &Surfel)> = facing
+            .map(|sample| (turn * sample.point.coords, sample))
             .collect();
-        let infinity = Vector3::repeat(f32::INFINITY);
-        let low = seen.iter().fold(infinity, |low, s| low.inf(&s.place));
-        let high = seen.iter().fold(-infinity, |high, s| high.sup(&s.place));
-        let longer = (high - low).xy().max();
-        if longer.is_nan() || longer <= SPECK {
-            return seen.first().map(|seen| seen.surfel).into_iter().collect();
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for (place, _) in &seen {
+            for axis in 0..2 {
+                low[axis] = low[axis].min(place[axis]);
+                high[axis] = high[axis].max(place[axis]);
+            }
         }
-        let grid = |cell| Grid::new(low, high, cell);
-        let coarse = grid(longer / COARSE);
-        let area = coarse.choose(&seen, 0.0).len() as f32 * coarse.cell.powi(2);
+        let extent = [high[0] - low[0], high[1] - low[1]];
+        let longer = extent[0].max(extent[1]);
+        if longer.is_nan() || longer <= SPECK {
+            return seen
+                .first()
+                .map(|(_, surfel)| **surfel)
+                .into_iter()
+                .collect();
+        }
+        let coarse = Grid::new(low, extent, longer / COARSE);
+        let mut occupied = vec![0_u8; coarse.cells()];
+        for (place, _) in &seen {
+            occupied[coarse.cell(place).0] = 1;
+        }
+        let occupied: usize = occupied.iter().map(|cell| usize::from(*cell)).sum();
+        let area = occupied as f32 * coarse.cell.powi(2);
         let count = self.count as f32;
         let smallest = longer / (MAX_CELLS * count).sqrt();
-        let fine = grid((area / count).sqrt().max(smallest));
+        let fine = Grid::new(low, extent, (area / count).sqrt().max(smallest));
         fine.choose(&seen, FRONT * self.diameter)
     }
 }
@@ -159,57 +170,56 @@ fn direction(side: usize) -> UnitVector3<f32> {
     UnitVector3::new_normalize(Vector3::new(radius * cos, radius * sin, z).cast())
 }
 
-/// A sample in a view along its z axis, toward the eye.
-struct Seen {
-    place: Vector3<f32>,
-    /// Object frame.
-    surfel: Surfel,
-}
-
 /// A grid of square cells over a view.
 struct Grid {
-    low: Vector3<f32>,
+    low: [f32; 2],
     cell: f32,
     columns: usize,
     rows: usize,
 }
 
 impl Grid {
-    fn new(low: Vector3<f32>, high: Vector3<f32>, cell: f32) -> Self {
-        let cells = |axis: usize| whole((high[axis] - low[axis]) / cell) + 1;
+    fn new(low: [f32; 2], extent: [f32; 2], cell: f32) -> Self {
+        let [columns, rows] = extent.map(|length| whole(length / cell) + 1);
         Self {
             low,
             cell,
-            columns: cells(0),
-            rows: cells(1),
+            columns,
+            rows,
         }
     }
 
-    /// Returns the cell of a place, and how far the place is from the middle.
+    fn cells(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// Returns the cell of a place, and the square of its distance from the middle, in cells.
     fn cell(&self, place: &Vector3<f32>) -> (usize, f32) {
         let [x, y] = [0, 1].map(|axis| (place[axis] - self.low[axis]) / self.cell);
         let (column, row) = (whole(x).min(self.columns - 1), whole(y).min(self.rows - 1));
-        let off = (x - x.floor() - 0.5).powi(2) + (y - y.floor() - 0.5).powi(2);
+        let off = (x - column as f32 - 0.5).powi(2) + (y - row as f32 - 0.5).powi(2);
         (row * self.columns + column, off)
     }
 
     /// Returns one surfel per occupied cell: of those at most `front` behind the foremost one, the
     /// nearest to the middle.
-    fn choose(&self, seen: &[Seen], front: f32) -> Vec<Surfel> {
-        let mut foremost = vec![f32::NEG_INFINITY; self.columns * self.rows];
-        for Seen { place, .. } in seen {
+    fn choose(&self, seen: &[(Vector3<f32>, &Surfel)], front: f32) -> Vec<Surfel> {
+        let mut foremost = vec![f32::NEG_INFINITY; self.cells()];
+        for (place, _) in seen {
             let foremost = &mut foremost[self.cell(place).0];
             *foremost = foremost.max(place.z);
         }
-        let mut chosen: Vec<Option<(f32, Surfel)>> = vec![None; foremost.len()];
-        for Seen { place, surfel } in seen {
+        let mut chosen = vec![(f32::INFINITY, None); self.cells()];
+        for (place, surfel) in seen {
             let (cell, off) = self.cell(place);
-            let in_front = place.z >= foremost[cell] - front;
-            if in_front && chosen[cell].is_none_or(|(least, _)| off < least) {
-                chosen[cell] = Some((off, *surfel));
+            if place.z >= foremost[cell] - front && off < chosen[cell].0 {
+                chosen[cell] = (off, Some(**surfel));
             }
         }
-        chosen.into_iter().flatten().map(|(_, s)| s).collect()
+        chosen
+            .into_iter()
+            .filter_map(|(_, surfel)| surfel)
+            .collect()
     }
 }
 

@@ -43,7 +43,7 @@ fn surfels_are_spread_over_the_image() {
     assert!((550..650).contains(&count), "{count}");
     let radius = 0.5 * model.diameter();
     let line = side.centroid - model.center();
-    assert!(line.angle(&direction).to_degrees() < 15.0);
+    assert!(line.angle(&direction).to_degrees() < 20.0);
     let outside = |limit: f64| {
         let off = |p: Vector3<f64>| (p - line * (p.dot(&line) / line.norm_squared())).norm();
         let points = side.surfels.iter();

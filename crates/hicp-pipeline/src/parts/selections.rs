@@ -31,7 +31,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(VisibleSurface { stride, at })
     });
     catalog.add_selection("visible-side", |p| {
-        p.about = "Selects what is seen of the model from the nearest of 96 sides, spread evenly \
+        p.about = "Selects what is seen of the model from the nearest of 48 sides, spread evenly \
             over the image. For many poses at low cost. Cost: O(samples), no render.";
         let count = p.limited(Samples, "samples", 0, 100, "points of a side, about")?;
         Ok(VisibleSide { count })

@@ -284,6 +284,7 @@ fn the_largest_counts_are_refused_or_end() {
             ("photometric", "samples"),
             ("repeat", "times"),
             ("sampled-mve", "samples"),
+            ("visible-side", "samples"),
         ]
     );
     assert!(ended > 20, "{ended}");

@@ -248,11 +248,6 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
                 continue;
             }
             self.explored.push(*start);
-            if !ends {
-                // A look-alike of a pose that fits may fit as it is.
-                let start = Outcome::refined(*start, Termination::Converged);
-                self.add(run, start, false);
-            }
             let outcome = run.refine(&mut self.explore, start);
             // A hypothesis that the stage keeps is still another pose than the initial one.
             let verdict = Verdict::Refined;
@@ -358,6 +353,16 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             let mut alike = std::mem::take(&mut self.alike);
             let scores = (&mut self.ranking, &mut self.score);
             let listed = alike.list(&mut run, (&best, bad), scores, &self.options);
+            if !bad {
+                // A look-alike of a pose that fits may fit as it is.
+                let as_it_is = listed.poses().iter().map(|(score, pose)| Found {
+                    score: *score,
+                    outcome: Outcome::refined(*pose, Termination::Converged),
+                    doubt: None,
+                    finished: false,
+                });
+                as_it_is.for_each(|found| self.found.add(found, &run.distinct));
+            }
             self.aligned.clear();
             let kept = (self.options.refined, self.options.spacing_degrees);
             self.align(&mut run, listed.poses(), kept);
