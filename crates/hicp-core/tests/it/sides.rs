@@ -56,13 +56,13 @@ fn surfels_are_spread_over_the_image() {
 
 #[test]
 fn hidden_and_averted_surfaces_are_not_seen() {
-    // Two boxes, one behind the other along z, and seen along z.
+    // A small box behind a large one, along z. The side toward the camera is up to 20° away.
     let (near, far) = (cuboid(0.1, 0.1, 0.1), cuboid(0.06, 0.06, 0.05));
     let n = u32::try_from(near.vertices().len()).unwrap();
     let moved = far
         .vertices()
         .iter()
-        .map(|p| p + Vector3::new(0.0, 0.0, 0.25));
+        .map(|p| p + Vector3::new(0.0, 0.0, 0.09));
     let vertices = near.vertices().iter().copied().chain(moved).collect();
     let moved = far.triangles().iter().map(|t| t.map(|v| v + n));
     let triangles = near.triangles().iter().copied().chain(moved).collect();
@@ -70,11 +70,11 @@ fn hidden_and_averted_surfaces_are_not_seen() {
     let sides = Sides::of(&model, 400);
     let seen = |z: f64| {
         let side = sides.toward(&Vector3::new(0.0, 0.0, z));
-        let far = side.surfels.iter().filter(|s| s.point.z > 0.15).count();
+        let far = side.surfels.iter().filter(|s| s.point.z > 0.06).count();
         far as f64 / side.surfels.len() as f64
     };
     assert!(seen(1.0) > 0.3, "{}", seen(1.0));
-    assert!(seen(-1.0) < 0.25, "{}", seen(-1.0));
+    assert!(seen(-1.0) < 0.08, "{}", seen(-1.0));
 }
 
 #[test]
@@ -97,16 +97,9 @@ fn extreme_models_have_sides() {
         [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[x, y]| Point3::new(at + size * x, size * y, 0.0))
     };
     let toward = Vector3::z();
-    let tiny = TriMesh::new(triangle(0.0, 1e-20).to_vec(), vec![[0, 1, 2]]);
-    if let Ok(tiny) = tiny {
-        assert!(
-            Sides::of(&Model::new(tiny), 100)
-                .toward(&toward)
-                .surfels
-                .len()
-                <= 1
-        );
-    }
+    let tiny = TriMesh::new(triangle(0.0, 1e-12).to_vec(), vec![[0, 1, 2]]).unwrap();
+    let sides = Sides::of(&Model::new(tiny), 100);
+    assert_eq!(sides.toward(&toward).surfels.len(), 1);
     let specks = [triangle(0.0, 1e-4), triangle(10.0, 1e-4)].concat();
     let specks = Model::new(TriMesh::new(specks, vec![[0, 1, 2], [3, 4, 5]]).unwrap());
     let count = Sides::of(&specks, usize::MAX).toward(&toward).surfels.len();

@@ -12,11 +12,11 @@ use crate::tolerances::N_TOLERANCES;
 
 /// An estimate of the MVE at low resolution, for ranking many poses.
 ///
-/// It splats points of the model into a coarse depth buffer and compares the buffer with the
-/// observation, as [`MeanVsd`](crate::MeanVsd) compares a render. The points are those of the
-/// side that faces the camera ([`Sides`](hicp_core::Sides)). It costs about
-/// 2 µs for every mesh. It does not replace the MVE for accepting or reporting a pose: pixels
-/// without a point count as not rendered, and thin parts may be missed.
+/// It splats the points of the side that faces the camera ([`Sides`](hicp_core::Sides)) into a
+/// coarse depth buffer, and compares the buffer with the observation, as
+/// [`MeanVsd`](crate::MeanVsd) compares a render. It costs about 2 µs for every mesh. It does not
+/// replace the MVE for accepting or reporting a pose: pixels without a point count as not rendered,
+/// and thin parts may be missed.
 ///
 /// Cost: O(samples) per pose. The points of a side are chosen once per model, in some 0.1 ms, and
 /// shared, and so is the coarse observation.

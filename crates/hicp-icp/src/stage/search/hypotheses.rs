@@ -24,7 +24,8 @@ pub enum Rotations {
     Symmetry,
 }
 
-/// Number of surfels of a side that determine the place of a hypothesis.
+/// Number of surfels of a side that determine the place of a hypothesis. The default of the ranking
+/// score, so that both share the sides.
 const PLACING_SURFELS: usize = 600;
 
 /// The source of the hypotheses of one search.
