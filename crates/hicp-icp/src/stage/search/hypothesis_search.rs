@@ -29,8 +29,9 @@ use crate::stage::stage_trait::Stage;
 ///    much.
 /// 5. **Look-alikes**: poses at which the model nearly covers the best pose, such as a mug that is
 ///    rotated around its axis, are ranked and refined in the same way. This step also runs if the
-///    local pose is good, because the score of a rotated mug is good, too. If the image shows
-///    enough of what tells the two poses apart, it costs only a projection of 256 points.
+///    local pose is good, because the score of a rotated mug is good, too. Look-alikes of a good
+///    pose are also kept as they are. If the image shows enough of what tells the two poses apart,
+///    it costs only a projection of 256 points.
 /// 6. **Finish**: the local stage refines the two best poses that differ, and up to a third of
 ///    `refined` if all stay doubtful. They are compared by score + doubt / 10.
 ///
@@ -355,13 +356,15 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             let listed = alike.list(&mut run, (&best, bad), scores, &self.options);
             if !bad {
                 // A look-alike of a pose that fits may fit as it is.
-                let as_it_is = listed.poses().iter().map(|(score, pose)| Found {
-                    score: *score,
-                    outcome: Outcome::refined(*pose, Termination::Converged),
-                    doubt: None,
-                    finished: false,
-                });
-                as_it_is.for_each(|found| self.found.add(found, &run.distinct));
+                for (score, pose) in listed.poses() {
+                    let as_it_is = Found {
+                        score: *score,
+                        outcome: Outcome::refined(*pose, Termination::Converged),
+                        doubt: None,
+                        finished: false,
+                    };
+                    self.found.add(as_it_is, &run.distinct);
+                }
             }
             self.aligned.clear();
             let kept = (self.options.refined, self.options.spacing_degrees);
