@@ -1,60 +1,58 @@
 //! Plane fits next to depth edges.
 
 use super::edges::Edges;
+use super::lanes::LANES;
 use super::patch::{DepthPatch, MIN_DEPTH_METERS};
+use super::plane_fits::PlaneFits;
+use super::row::Row;
 use super::size::EDGE_RADIUS;
-use super::window::{Rays, WindowSums};
 use crate::internal::VectorLoop;
-use crate::surfel::Surfel;
 
-/// Columns that are summed in parallel: those of the largest window, and one that stays empty.
-const LANES: usize = 2 * EDGE_RADIUS + 2;
+// The columns of the largest window are summed in parallel, with one that stays empty.
+const _: () = assert!(LANES == 2 * EDGE_RADIUS + 2);
 
 /// A set of pixels of the gated window, one byte per row: bit `8 y + x`.
 type Joined = u64;
 
-/// Fits the pixels of row `v` near depth edges, each to the neighbors on its own side.
-pub(super) struct FitGated<'a> {
-    pub(super) patch: &'a DepthPatch<'a>,
+/// Sums the pixels of a row near depth edges, each with the neighbors on its own side.
+pub(super) struct FitGated<'a, 'b> {
     pub(super) edges: &'a Edges,
-    pub(super) rays: &'a Rays,
     pub(super) edge_step: f32,
     /// Half side of the window, at most [`EDGE_RADIUS`] pixels.
     pub(super) radius: usize,
-    pub(super) v: usize,
-    /// The surfels of the row. Those of other pixels are not changed.
-    pub(super) surfels: &'a mut [Surfel],
+    pub(super) fits: &'a mut PlaneFits,
+    pub(super) row: &'a mut Row<'b>,
 }
 
-impl VectorLoop for FitGated<'_> {
+impl VectorLoop for FitGated<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let width = self.patch.region.width();
-        for u in self.edges.near.columns(self.v, width) {
-            let z = self.patch.depth[self.v * width + u];
-            if z >= MIN_DEPTH_METERS {
-                let window = Window::around(self.patch, u, self.v, self.radius);
+        let (patch, v) = (self.row.patch, self.row.v);
+        let depth = patch.row(v);
+        for u in self.edges.near.columns(v, depth.len()) {
+            if depth[u] >= MIN_DEPTH_METERS {
+                let window = Window::around(patch, u, v, self.radius);
                 let sums = self.sums(&window, window.joined(self.edges));
-                let at = (u - window.left, self.v - window.top);
-                let normal = sums.normal(self.rays, (u, self.v), at);
-                self.surfels[u] = self.rays.surfel((u, self.v), z, normal);
+                let at = [(u - window.left) as f64, (v - window.top) as f64];
+                self.fits.push(u, at, sums);
+                if self.fits.is_full() {
+                    self.fits.solve(self.row);
+                }
             }
         }
     }
 }
 
-impl FitGated<'_> {
+impl FitGated<'_, '_> {
     /// Sums the pixels of a set that also lie within a depth gate.
     ///
     /// Without the gate, a path around the end of an edge may reach its other side, and slopes just
     /// below an edge may add up.
     #[inline(always)]
-    fn sums(&self, window: &Window, joined: Joined) -> WindowSums {
-        let width = self.patch.region.width();
-        let depth = self.patch.depth;
-        let center = depth[window.v * width + window.u];
+    fn sums(&self, window: &Window, joined: Joined) -> [f64; 9] {
+        let center = self.row.patch.row(window.v)[window.u];
         let mut across = [0.0_f32; LANES];
         for (lane, across) in across.iter_mut().enumerate() {
             *across = (window.left + lane).abs_diff(window.u) as f32;
@@ -65,14 +63,8 @@ impl FitGated<'_> {
         let (mut w, mut yw) = ([0.0_f64; LANES], [0.0_f64; LANES]);
         for row in 0..window.rows {
             let v = window.top + row;
-            let mut z = [0.0; LANES];
-            let pixels = &depth[v * width + window.left..];
             // Pixels beyond the end of the row are not in the set.
-            if let Some(pixels) = pixels.first_chunk() {
-                z = *pixels;
-            } else {
-                z[..pixels.len()].copy_from_slice(pixels);
-            }
+            let z = self.row.patch.block(window.left, v).0;
             #[allow(clippy::cast_possible_truncation)] // A byte, and a row of the window.
             let (bits, line) = ((joined >> (8 * row)) as u32 & 0xff, row as u32);
             let away = (v.abs_diff(window.v).max(1)) as f32;
@@ -86,17 +78,52 @@ impl FitGated<'_> {
                 let used = (bits >> lane & 1 != 0)
                     & (z[lane] >= MIN_DEPTH_METERS)
                     & ((z[lane] - center).abs() <= gate);
-                let one = u32::from(used);
-                n[lane] += one;
-                y[lane] += one * line;
-                yy[lane] += one * (line * line);
+                // All bits are set where the pixel is used.
+                let mask = u32::from(used).wrapping_neg();
+                n[lane] += mask & 1;
+                y[lane] += mask & line;
+                yy[lane] += mask & (line * line);
                 let inverse = 1.0 / f64::from(if used { z[lane] } else { f32::INFINITY });
                 w[lane] += inverse;
                 yw[lane] += inverse * f64::from(line);
             }
         }
-        WindowSums::of_columns(&n, &y, &yy, &w, &yw)
+        sum_columns(&n, &y, &yy, &w, &yw)
     }
+}
+
+/// Sums columns, given by n, Σv, Σv², Σw and Σvw of each.
+///
+/// Returns n, Σu, Σv, Σu², Σuv, Σv², Σw, Σuw and Σvw.
+#[inline(always)]
+fn sum_columns(
+    n: &[u32; LANES],
+    v: &[u32; LANES],
+    vv: &[u32; LANES],
+    w: &[f64; LANES],
+    vw: &[f64; LANES],
+) -> [f64; 9] {
+    let (mut counts, mut sums) = ([0_u32; 6], [0.0; 3]);
+    for (u, column) in (0_u32..).zip(0..LANES) {
+        let terms = [
+            n[column],
+            u * n[column],
+            v[column],
+            u * u * n[column],
+            u * v[column],
+            vv[column],
+        ];
+        for (sum, term) in counts.iter_mut().zip(terms) {
+            *sum += term;
+        }
+        let terms = [w[column], f64::from(u) * w[column], vw[column]];
+        for (sum, term) in sums.iter_mut().zip(terms) {
+            *sum += term;
+        }
+    }
+    let [n, u, v, uu, uv, vv] = counts.map(f64::from);
+    let [w, uw, vw] = sums;
+    [n, u, v, uu, uv, vv, w, uw, vw]
 }
 
 /// The gated window around a pixel, cut at the borders.

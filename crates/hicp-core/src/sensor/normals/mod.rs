@@ -11,6 +11,8 @@ mod edges;
 mod gated;
 mod lanes;
 mod patch;
+mod plane_fits;
+mod row;
 mod size;
 mod window;
 
@@ -19,8 +21,10 @@ use std::ops::Range;
 use edges::Edges;
 use gated::FitGated;
 pub(crate) use patch::DepthPatch;
+use plane_fits::PlaneFits;
+use row::{Rays, Row};
 pub use size::NormalWindow;
-use window::{ColumnSums, Fit, Rays};
+use window::{ColumnSums, Fit};
 
 use crate::internal::vectorized;
 use crate::surfel::Surfel;
@@ -31,18 +35,23 @@ use crate::surfel::Surfel;
 const EDGE_TILT_DEGREES: f64 = 85.0;
 /// … and larger than this many of its standard deviations, which are √2 times those of a depth.
 const EDGE_SIGMAS: f64 = 5.0;
+/// Number of pixels that are skipped at once where nothing is used.
+const BLOCK: usize = 16;
 /// Number of pixels for the noise estimate.
 const NOISE_SAMPLES: usize = 4096;
 
-/// Returns the surfels of the patch, row-major.
+/// Returns the surfels of the patch, row-major, and the number of pixels that have one.
 ///
 /// Points and normals are in the camera frame, and normals face the camera. Pixels without a normal
 /// have [`Surfel::NOTHING`]: those without depth, and those with too few neighbors on their own
 /// side of the depth edges (flying pixels, single-pixel lines).
-pub(crate) fn estimate_normals(patch: &DepthPatch<'_>, window: NormalWindow) -> Vec<Surfel> {
-    let mut surfels = Vec::with_capacity(patch.region.area());
+pub(crate) fn estimate_normals(
+    patch: &DepthPatch<'_>,
+    window: NormalWindow,
+) -> (Vec<Surfel>, usize) {
+    let (mut surfels, mut n_fitted) = (vec![Surfel::NOTHING; patch.region.area()], 0);
     if patch.region.is_empty() {
-        return surfels;
+        return (surfels, n_fitted);
     }
     let (width, height) = (patch.region.width(), patch.region.height());
     let spans: Vec<_> = (0..height).map(|v| used(patch.row(v))).collect();
@@ -59,41 +68,53 @@ pub(crate) fn estimate_normals(patch: &DepthPatch<'_>, window: NormalWindow) -> 
     for v in 0..radius {
         columns.slide(v, patch, &spans);
     }
+    let mut fits = PlaneFits::new();
     for (v, span) in spans.iter().enumerate() {
         columns.slide(v + radius, patch, &spans);
-        surfels.resize(v * width + span.start, Surfel::NOTHING);
-        vectorized(Fit {
-            columns: &columns,
+        let mut row = Row {
+            patch,
             rays: &rays,
             v,
+            surfels: &mut surfels[v * width..][..width],
+        };
+        vectorized(Fit {
+            columns: &columns,
             span: span.clone(),
-            depth: patch.row(v),
-            surfels: &mut surfels,
+            fits: &mut fits,
+            row: &mut row,
         });
         if let Some(edges) = &edges {
             vectorized(FitGated {
-                patch,
                 edges,
-                rays: &rays,
                 edge_step,
                 radius: edge_radius,
-                v,
-                surfels: &mut surfels[v * width..],
+                fits: &mut fits,
+                row: &mut row,
             });
         }
+        fits.solve(&mut row);
+        n_fitted += n_surfels(row.surfels);
     }
-    surfels.resize(patch.region.area(), Surfel::NOTHING);
-    surfels
+    (surfels, n_fitted)
+}
+
+/// Returns the number of pixels with a surfel.
+pub(crate) fn n_surfels(surfels: &[Surfel]) -> usize {
+    surfels.iter().filter(|s| s.point.z > 0.0).count()
 }
 
 /// Returns the columns from the first pixel with depth to the last; empty if there is none.
 fn used(depth: &[f32]) -> Range<usize> {
     let is_used = |z: &f32| *z > 0.0;
+    // Empty blocks are skipped as a whole.
+    let is_empty = |block: &&[f32]| block.iter().fold(0, |bits, z| bits | z.to_bits()) == 0;
+    let left = BLOCK * depth.chunks_exact(BLOCK).take_while(is_empty).count();
+    let right = BLOCK * depth.rchunks_exact(BLOCK).take_while(is_empty).count();
     match (
-        depth.iter().position(is_used),
-        depth.iter().rposition(is_used),
+        depth[left..].iter().position(is_used),
+        depth[..depth.len() - right].iter().rposition(is_used),
     ) {
-        (Some(first), Some(last)) => first..last + 1,
+        (Some(first), Some(last)) => left + first..last + 1,
         _ => 0..0,
     }
 }
@@ -104,18 +125,19 @@ fn used(depth: &[f32]) -> Range<usize> {
 /// Second differences of a smooth surface are tiny, and those across edges are few, so their median
 /// measures noise. White noise of deviation σ gives them a deviation of √6 σ.
 fn relative_noise(patch: &DepthPatch<'_>) -> f64 {
-    let width = patch.region.width();
-    let triples = patch.depth.len().saturating_sub(2);
-    let step = triples / NOISE_SAMPLES + 1;
-    let mut differences: Vec<f32> = (0..triples)
-        .step_by(step)
-        .filter(|i| i % width + 2 < width)
-        .filter_map(|i| {
-            let z = &patch.depth[i..i + 3];
-            (z[0] > 0.0 && z[1] > 0.0 && z[2] > 0.0)
-                .then(|| ((z[0] - 2.0 * z[1] + z[2]) / z[1]).abs())
-        })
-        .collect();
+    let (width, depth) = (patch.region.width(), patch.pixels());
+    let step = depth.len().saturating_sub(2) / NOISE_SAMPLES + 1;
+    let mut differences = Vec::with_capacity(NOISE_SAMPLES);
+    let mut u = 0;
+    for z in depth.windows(3).step_by(step) {
+        if u + 2 < width && z[0] > 0.0 && z[1] > 0.0 && z[2] > 0.0 {
+            differences.push(((z[0] - 2.0 * z[1] + z[2]) / z[1]).abs());
+        }
+        u += step;
+        while u >= width {
+            u -= width;
+        }
+    }
     if differences.is_empty() {
         return 0.0;
     }

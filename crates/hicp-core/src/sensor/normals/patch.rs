@@ -1,6 +1,9 @@
 //! The depth patch from which normals are estimated.
 
+use super::lanes::{LANES, Lanes, lanes};
+use crate::internal::{VectorLoop, vectorized};
 use crate::sensor::camera::PinholeCamera;
+use crate::sensor::image::{DepthImage, Mask};
 use crate::sensor::region::PixelRegion;
 
 /// Depths below this limit, in meters, have no normal.
@@ -9,17 +12,90 @@ use crate::sensor::region::PixelRegion;
 /// depths of the other pixels.
 pub(super) const MIN_DEPTH_METERS: f32 = 1e-4;
 
-/// Depth inside a region in meters, row-major. Unused pixels are 0.
+/// Depth inside a mask's bounding box in meters, row-major. Unused pixels are 0.
 pub(crate) struct DepthPatch<'a> {
     pub(crate) region: PixelRegion,
-    pub(crate) camera: &'a PinholeCamera,
-    pub(crate) depth: &'a [f32],
+    pub(super) camera: &'a PinholeCamera,
+    /// Followed by a block of zeros.
+    depth: Vec<f32>,
 }
 
-impl DepthPatch<'_> {
+impl<'a> DepthPatch<'a> {
+    /// Copies the masked depths of an image.
+    pub(crate) fn new(depth: &DepthImage, mask: &Mask, camera: &'a PinholeCamera) -> Self {
+        let region = mask.bounding_region();
+        let (width, image_width) = (region.width(), depth.width() as usize);
+        let mut patch = vec![0.0; region.area() + LANES];
+        for (v, to) in
+            (region.v_min as usize..).zip(patch[..region.area()].chunks_exact_mut(width.max(1)))
+        {
+            let columns = v * image_width + region.u_min as usize..;
+            vectorized(CopyMasked {
+                depth: &depth.pixels()[columns.clone()],
+                mask: &mask.pixels()[columns],
+                to,
+            });
+        }
+        Self {
+            region,
+            camera,
+            depth: patch,
+        }
+    }
+
+    /// Returns the number of used pixels.
+    pub(crate) fn n_measured(&self) -> usize {
+        vectorized(CountUsed(self.pixels()))
+    }
+
+    /// Returns all pixels.
+    pub(super) fn pixels(&self) -> &[f32] {
+        &self.depth[..self.region.area()]
+    }
+
     /// Returns the pixels of row `v` of the region.
     pub(super) fn row(&self, v: usize) -> &[f32] {
         let width = self.region.width();
         &self.depth[v * width..(v + 1) * width]
+    }
+
+    /// Returns the pixels of a block that starts at (u, v).
+    ///
+    /// Those beyond the end of the row are of the next row, or zeros.
+    #[inline(always)]
+    pub(super) fn block(&self, u: usize, v: usize) -> Lanes<f32> {
+        lanes(&self.depth, v * self.region.width() + u)
+    }
+}
+
+/// The loop that copies the masked pixels of a row.
+struct CopyMasked<'a> {
+    depth: &'a [f32],
+    mask: &'a [bool],
+    to: &'a mut [f32],
+}
+
+impl VectorLoop for CopyMasked<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for ((to, z), masked) in self.to.iter_mut().zip(self.depth).zip(self.mask) {
+            *to = if *masked { *z } else { 0.0 };
+        }
+    }
+}
+
+/// The loop that counts the used pixels.
+struct CountUsed<'a>(&'a [f32]);
+
+impl VectorLoop for CountUsed<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run(self) -> usize {
+        // The sum stays below 2³⁰ in any accepted image. In 32 bits, more counters fit into a
+        // vector.
+        self.0.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>() as usize
     }
 }
