@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use hicp_core::Point3;
-use hicp_core::internal::Work;
+use hicp_core::internal::{Work, stored};
 
 /// Children of a node.
 const WIDTH: usize = 8;
@@ -238,7 +238,7 @@ impl<const LEAF_SIZE: usize> LeavesNear<'_, LEAF_SIZE> {
     /// top.
     #[inline(always)]
     fn push_children(&mut self, node: &Node, bound: f32) {
-        let distances = node.distances(&self.query);
+        let distances = stored(node.distances(&self.query));
         // The limit is finite, so that missing children are excluded.
         let limit = (bound / PRUNING_SLACK).min(f32::MAX);
         let mut near = 0;

@@ -1,6 +1,7 @@
 //! Exact nearest points.
 
 use hicp_core::Point3;
+use hicp_core::internal::stored;
 
 use crate::search::box_tree::{BoxTree, Stack};
 use crate::search::nearest::{Nearest, PointIndex};
@@ -161,7 +162,7 @@ impl PointTree {
         let order = self.tree.order();
         let mut leaves = self.tree.leaves_near(query, stack);
         while let Some(slots) = leaves.next(bound) {
-            let distances = distances(&self.leaves[slots.start / LEAF_SIZE], query);
+            let distances = stored(distances(&self.leaves[slots.start / LEAF_SIZE], query));
             let mut near = 0;
             for (lane, distance) in distances.iter().enumerate() {
                 near |= u32::from(*distance <= bound) << lane;

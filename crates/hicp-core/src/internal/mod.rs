@@ -18,6 +18,6 @@ pub use label::type_label;
 pub use plane::DepthPlane;
 pub use seen_colors::{ColorSamples, FacingSample, SeenColors, faces_camera};
 pub use suggest::nearest_name;
-pub use vectorized::{VectorLoop, vectorized};
+pub use vectorized::{VectorLoop, stored, vectorized};
 pub use whole::whole;
 pub use work::Work;

@@ -22,6 +22,16 @@ pub fn vectorized<L: VectorLoop>(vector_loop: L) -> L::Output {
     pulp::Arch::new().dispatch(Adapter(vector_loop))
 }
 
+/// Returns its argument, which the compiler must have stored before it reads single lanes.
+///
+/// Without this, a later use of each lane can make it compute some of the lanes one by one. The
+/// bits are the same.
+#[inline(always)]
+#[must_use]
+pub fn stored<const N: usize>(lanes: [f32; N]) -> [f32; N] {
+    std::hint::black_box(lanes)
+}
+
 struct Adapter<L>(L);
 
 impl<L: VectorLoop> pulp::NullaryFnOnce for Adapter<L> {
