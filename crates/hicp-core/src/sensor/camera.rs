@@ -242,6 +242,7 @@ impl PinholeCamera {
     ///
     /// The point is in the camera frame, in meters. The position may lie outside the image.
     #[must_use]
+    #[inline]
     pub fn project(&self, point: &Point3<f64>) -> Option<Point2<f64>> {
         (point.z > 0.0).then(|| {
             Point2::new(
@@ -256,6 +257,7 @@ impl PinholeCamera {
     /// The depth is along the optical axis. The point has the unit of the depth, meters inside this
     /// library.
     #[must_use]
+    #[inline]
     pub fn unproject(&self, u: f64, v: f64, depth: f64) -> Point3<f64> {
         Point3::new(
             (u - self.cx) / self.fx * depth,

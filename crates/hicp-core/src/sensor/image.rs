@@ -71,6 +71,7 @@ macro_rules! image_accessors {
 
         /// Returns the value at column `u`, row `v`, or `None` outside the image.
         #[must_use]
+        #[inline]
         pub fn get(&self, u: u32, v: u32) -> Option<$pixel> {
             self.0.get(u, v)
         }

@@ -31,6 +31,7 @@ impl PixelRegion {
 
     /// Number of columns.
     #[must_use]
+    #[inline]
     pub fn width(&self) -> usize {
         self.u_max.saturating_sub(self.u_min) as usize
     }
@@ -55,6 +56,7 @@ impl PixelRegion {
 
     /// Returns whether pixel (u, v) lies inside.
     #[must_use]
+    #[inline]
     pub fn contains(&self, u: u32, v: u32) -> bool {
         (self.u_min..self.u_max).contains(&u) && (self.v_min..self.v_max).contains(&v)
     }
@@ -63,6 +65,7 @@ impl PixelRegion {
     ///
     /// Outside the region, returns `None`.
     #[must_use]
+    #[inline]
     pub fn index(&self, u: u32, v: u32) -> Option<usize> {
         self.contains(u, v)
             .then(|| (v - self.v_min) as usize * self.width() + (u - self.u_min) as usize)

@@ -125,21 +125,20 @@ impl TrustMap {
         }
         let mut weights = Vec::with_capacity(region.area());
         let mut total = 0;
-        for v in region.v_min..region.v_max {
-            let start = (v - region.v_min) as usize / step * width;
-            for u in region.u_min..region.u_max {
-                let measured = depth.get(u, v).is_some_and(|z| z > 0.0);
+        for (row, v) in (region.v_min..region.v_max).enumerate() {
+            let start = v as usize * depth.width() as usize;
+            let columns = start + region.u_min as usize..start + region.u_max as usize;
+            let depths = depth.pixels()[columns.clone()].chunks(step);
+            let masked = mask.pixels()[columns].chunks(step);
+            for ((depths, masked), trust) in depths.zip(masked).zip(&trust[row / step * width..]) {
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // At most 255.
-                let weight = match (measured, mask.get(u, v)) {
-                    (true, _) => {
-                        let column = (u - region.u_min) as usize / step;
-                        (trust[start + column] * f32::from(CERTAIN)) as u8
-                    }
-                    (false, Some(true)) => CERTAIN,
-                    _ => 0,
-                };
-                total += if measured { u64::from(weight) } else { 0 };
-                weights.push(weight);
+                let trusted = (trust * f32::from(CERTAIN)) as u8;
+                for (z, masked) in depths.iter().zip(masked) {
+                    let measured = *z > 0.0;
+                    let unmeasured = if *masked { CERTAIN } else { 0 };
+                    weights.push(if measured { trusted } else { unmeasured });
+                    total += if measured { u64::from(trusted) } else { 0 };
+                }
             }
         }
         Self {

@@ -68,10 +68,10 @@ impl Line {
     /// Returns a pixel of the line, or `None` outside of the image.
     pub(super) fn pixel_at(&self, index: usize, camera: &PinholeCamera) -> Option<(u32, u32)> {
         let steps = Self::steps(index);
-        let u = (f64::from(self.pixel.0) + self.step.0 * steps).round();
-        let v = (f64::from(self.pixel.1) + self.step.1 * steps).round();
+        // The square of a pixel extends half a pixel around its integer center.
+        let u = f64::from(self.pixel.0) + self.step.0 * steps + 0.5;
+        let v = f64::from(self.pixel.1) + self.step.1 * steps + 0.5;
         let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A pixel of the image.
         let inside = (0.0..width).contains(&u) && (0.0..height).contains(&v);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A pixel of the image.
         inside.then_some((u as u32, v as u32))
