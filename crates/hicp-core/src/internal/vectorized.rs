@@ -22,10 +22,10 @@ pub fn vectorized<L: VectorLoop>(vector_loop: L) -> L::Output {
     pulp::Arch::new().dispatch(Adapter(vector_loop))
 }
 
-/// Returns its argument, which the compiler must have stored before it reads single lanes.
+/// Returns its argument. The compiler must store all lanes before it reads single ones.
 ///
-/// Without this, a later use of each lane can make it compute some of the lanes one by one. The
-/// bits are the same.
+/// Otherwise, a later use of single lanes can make it compute some of them one by one. The bits are
+/// the same.
 #[inline(always)]
 #[must_use]
 pub fn stored<const N: usize>(lanes: [f32; N]) -> [f32; N] {

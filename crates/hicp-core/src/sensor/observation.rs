@@ -116,7 +116,7 @@ impl Observation {
         )?;
 
         let patch = DepthPatch::new(&depth, &mask, &camera);
-        let (region, n_measured) = (patch.region, patch.n_measured());
+        let (region, n_measured) = (patch.region, patch.n_measured);
         // Deviation: pixels without normals leave C: §III-A gives every point of C a normal. Here a
         // pixel whose neighbors do not determine a plane (a flying pixel, a line) has no surfel. It
         // is not paired by any metric, and still counts toward the MVE.

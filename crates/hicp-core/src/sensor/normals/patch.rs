@@ -16,6 +16,8 @@ pub(super) const MIN_DEPTH_METERS: f32 = 1e-4;
 pub(crate) struct DepthPatch<'a> {
     pub(crate) region: PixelRegion,
     pub(super) camera: &'a PinholeCamera,
+    /// Number of used pixels.
+    pub(crate) n_measured: usize,
     /// Followed by a block of zeros.
     depth: Vec<f32>,
 }
@@ -25,12 +27,11 @@ impl<'a> DepthPatch<'a> {
     pub(crate) fn new(depth: &DepthImage, mask: &Mask, camera: &'a PinholeCamera) -> Self {
         let region = mask.bounding_region();
         let (width, image_width) = (region.width(), depth.width() as usize);
-        let mut patch = vec![0.0; region.area() + LANES];
-        for (v, to) in
-            (region.v_min as usize..).zip(patch[..region.area()].chunks_exact_mut(width.max(1)))
-        {
+        let (mut patch, mut n_measured) = (vec![0.0; region.area() + LANES], 0);
+        let rows = patch[..region.area()].chunks_exact_mut(width.max(1));
+        for (v, to) in (region.v_min as usize..).zip(rows) {
             let columns = v * image_width + region.u_min as usize..;
-            vectorized(CopyMasked {
+            n_measured += vectorized(CopyMasked {
                 depth: &depth.pixels()[columns.clone()],
                 mask: &mask.pixels()[columns],
                 to,
@@ -39,13 +40,9 @@ impl<'a> DepthPatch<'a> {
         Self {
             region,
             camera,
+            n_measured,
             depth: patch,
         }
-    }
-
-    /// Returns the number of used pixels.
-    pub(crate) fn n_measured(&self) -> usize {
-        vectorized(CountUsed(self.pixels()))
     }
 
     /// Returns all pixels.
@@ -68,7 +65,7 @@ impl<'a> DepthPatch<'a> {
     }
 }
 
-/// The loop that copies the masked pixels of a row.
+/// The loop that copies the masked pixels of a row, and counts those with depth.
 struct CopyMasked<'a> {
     depth: &'a [f32],
     mask: &'a [bool],
@@ -76,26 +73,16 @@ struct CopyMasked<'a> {
 }
 
 impl VectorLoop for CopyMasked<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for ((to, z), masked) in self.to.iter_mut().zip(self.depth).zip(self.mask) {
-            *to = if *masked { *z } else { 0.0 };
-        }
-    }
-}
-
-/// The loop that counts the used pixels.
-struct CountUsed<'a>(&'a [f32]);
-
-impl VectorLoop for CountUsed<'_> {
     type Output = usize;
 
     #[inline(always)]
     fn run(self) -> usize {
-        // The sum stays below 2³⁰ in any accepted image. In 32 bits, more counters fit into a
-        // vector.
-        self.0.iter().map(|z| u32::from(*z > 0.0)).sum::<u32>() as usize
+        // In 32 bits, more counters fit into a vector.
+        let mut n_measured = 0_u32;
+        for ((to, z), masked) in self.to.iter_mut().zip(self.depth).zip(self.mask) {
+            *to = if *masked { *z } else { 0.0 };
+            n_measured += u32::from(*to > 0.0);
+        }
+        n_measured as usize
     }
 }

@@ -152,6 +152,7 @@ impl VectorLoop for Solve<'_, '_> {
     #[allow(clippy::cast_possible_truncation)] // Surfels are of single precision.
     fn run(self) {
         let Self { fits, row } = self;
+        // The limit is never reached, but tells the compiler that indices are in range.
         let (rays, len) = (row.rays, fits.len.min(CAPACITY));
         for (x, u) in fits.x.iter_mut().zip(&fits.columns[..len]) {
             *x = rays.x[*u];
