@@ -39,7 +39,16 @@ pub fn write_atomically<F>(path: impl AsRef<Path>, write: F) -> Result<(), IoErr
 where
     F: FnOnce(&mut dyn Write) -> io::Result<()>,
 {
-    let path = path.as_ref();
+    // Compiled once, not for every closure.
+    let mut write = Some(write);
+    let mut once = |writer: &mut dyn Write| write.take().map_or(Ok(()), |write| write(writer));
+    replace(path.as_ref(), &mut once)
+}
+
+/// The function that fills a file.
+type Filling<'a> = &'a mut dyn FnMut(&mut dyn Write) -> io::Result<()>;
+
+fn replace(path: &Path, write: Filling<'_>) -> Result<(), IoError> {
     let written = if is_stdout(path) {
         fill(io::stdout(), write).and_then(|mut stdout| stdout.flush())
     } else if is_stream(path) {
@@ -167,11 +176,7 @@ fn temporary(path: &Path) -> io::Result<(NamedTempFile, PathBuf)> {
     Ok((file, target))
 }
 
-fn fill<W, F>(target: W, write: F) -> io::Result<W>
-where
-    W: Write,
-    F: FnOnce(&mut dyn Write) -> io::Result<()>,
-{
+fn fill<W: Write>(target: W, write: Filling<'_>) -> io::Result<W> {
     let mut writer = BufWriter::new(target);
     write(&mut writer)?;
     writer.into_inner().map_err(io::IntoInnerError::into_error)

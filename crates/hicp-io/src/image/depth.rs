@@ -166,17 +166,33 @@ impl ReadLimits {
 ///
 /// [`IoError`] if the scale is not finite and positive, or if a depth is above 65535 units.
 /// Otherwise as for [`write_atomically`](crate::write_atomically).
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "the range is checked"
-)]
 pub fn write_depth_png(
     path: impl AsRef<Path>,
     depth: &DepthImage,
     millimeters_per_unit: f64,
 ) -> Result<(), IoError> {
     let path = path.as_ref();
+    let size = (depth.width(), depth.height());
+    let kind = (ColorType::Grayscale, BitDepth::Sixteen);
+    pixels::write(
+        path,
+        size,
+        kind,
+        &in_units(path, depth, millimeters_per_unit)?,
+    )
+}
+
+/// Returns the big-endian bytes of an image in the unit of its file.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the range is checked"
+)]
+fn in_units(
+    path: &Path,
+    depth: &DepthImage,
+    millimeters_per_unit: f64,
+) -> Result<Vec<u8>, IoError> {
     check_scale(path, millimeters_per_unit)?;
     let mut bytes = Vec::with_capacity(2 * depth.pixels().len());
     for (index, &meters) in depth.pixels().iter().enumerate() {
@@ -194,9 +210,7 @@ pub fn write_depth_png(
         }
         bytes.extend((units as u16).to_be_bytes());
     }
-    let size = (depth.width(), depth.height());
-    let kind = (ColorType::Grayscale, BitDepth::Sixteen);
-    pixels::write(path, size, kind, &bytes)
+    Ok(bytes)
 }
 
 fn check_scale(path: &Path, value: f64) -> Result<(), IoError> {

@@ -48,6 +48,10 @@ impl ReadLimits {
 ///
 /// As for [`write_atomically`](crate::write_atomically).
 pub fn write_mask_png(path: impl AsRef<Path>, mask: &Mask) -> Result<(), IoError> {
+    write(path.as_ref(), mask)
+}
+
+fn write(path: &Path, mask: &Mask) -> Result<(), IoError> {
     let bytes: Vec<u8> = mask
         .pixels()
         .iter()
@@ -55,7 +59,7 @@ pub fn write_mask_png(path: impl AsRef<Path>, mask: &Mask) -> Result<(), IoError
         .collect();
     let size = (mask.width(), mask.height());
     let kind = (ColorType::Grayscale, BitDepth::Eight);
-    pixels::write(path.as_ref(), size, kind, &bytes)
+    pixels::write(path, size, kind, &bytes)
 }
 
 #[cfg(test)]

@@ -44,7 +44,7 @@ fn scenes_models_and_targets_agree() {
                         == (scene_id, image, truth.obj_id)
                 }));
                 let mask = scene.read_visible_mask(image, instance).unwrap();
-                let set = mask.pixels().iter().filter(|set| **set).count();
+                let set = mask.n_set();
                 assert_eq!(set, info.visible_pixels.unwrap() as usize);
                 assert_eq!(Rle::of_mask(&mask).to_mask(), mask);
                 // The median depth in the mask is near the object: all units are meters.
