@@ -14,11 +14,9 @@ use std::sync::Arc;
 
 use hicp_sim::{Household, RelativeGaussian, SimRng, object_pose};
 use hybrid_icp::core::{
-    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Symmetries,
-    se3,
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Symmetries, se3,
 };
-use hybrid_icp::icp::Workspace;
-use hybrid_icp::raster::Rasterizer;
+use hybrid_icp::raster::render_depth_image;
 
 /// The ten objects of the starts and of the figures quoted from them.
 pub const OBJECTS: [Household; 10] = [
@@ -114,31 +112,9 @@ pub fn camera() -> PinholeCamera {
 
 /// Renders a model into a depth image of the whole camera, with the mask of its pixels.
 pub fn render(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> (DepthImage, Mask) {
-    let nothing = DepthImage::from_meters(
-        camera.width(),
-        camera.height(),
-        vec![0.0; (camera.width() * camera.height()) as usize],
-    )
-    .expect("sizes agree");
-    let empty = Observation::new(
-        nothing,
-        Mask::full(camera.width(), camera.height()),
-        *camera,
-    )
-    .expect("sizes agree");
-    let mut workspace = Workspace::new(Rasterizer::default());
-    let problem = Problem::new(model, &empty);
-    let mut context: Context<'_> = workspace.context(&problem);
-    let view = context.view(pose).expect("a model and an image");
-    let depths: Vec<f32> = (0..camera.height())
-        .flat_map(|v| (0..camera.width()).map(move |u| (u, v)))
-        .map(|(u, v)| view.depth_at(u, v))
-        .collect();
-    let masked = depths.iter().map(|z| *z > 0.0).collect();
-    (
-        DepthImage::from_meters(camera.width(), camera.height(), depths).expect("sizes agree"),
-        Mask::new(camera.width(), camera.height(), masked).expect("sizes agree"),
-    )
+    let depth = render_depth_image(model.mesh(), camera, pose);
+    let mask = Mask::measured(&depth);
+    (depth, mask)
 }
 
 /// Creates a scene: the object at a random pose, 0.3 to 0.6 m away, with relative depth noise.

@@ -298,7 +298,7 @@ impl Seen {
 }
 
 fn count(mask: &Mask) -> usize {
-    mask.pixels().iter().filter(|on| **on).count()
+    mask.n_set()
 }
 
 /// A sensor with independent noise, percent of the depth.

@@ -274,7 +274,6 @@ impl CaseMaker {
         };
         let camera = self.config.camera;
         let depth = render_depth_image(model.mesh(), &camera, &camera_from_object);
-        let seen = depth.pixels().iter().map(|z| *z > 0.0).collect();
         Ok(Case {
             object: object.to_owned(),
             seed,
@@ -285,7 +284,7 @@ impl CaseMaker {
             bin: start.bin,
             vsd_initial: start.vsd,
             tries: start.tries,
-            mask: Mask::new(camera.width(), camera.height(), seen)?,
+            mask: Mask::measured(&depth),
             depth,
         })
     }

@@ -4,8 +4,9 @@ use hicp_core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, Point3, TriMesh, UnitQuaternion, Vector3,
 };
 use hicp_raster::render_depth_image;
-use rand::{Rng, RngExt};
+use rand::RngExt;
 
+use crate::SimRng;
 use crate::error::{SimError, check_range};
 use crate::sensor::DepthSensor;
 
@@ -76,11 +77,7 @@ impl Clutter {
     /// # Errors
     ///
     /// [`SimError::Parameter`] if there is no model, or if `count` is not in 1 to 100.
-    pub fn draw<R: Rng + ?Sized>(
-        rng: &mut R,
-        models: &[Model],
-        count: usize,
-    ) -> Result<Self, SimError> {
+    pub fn draw(rng: &mut SimRng, models: &[Model], count: usize) -> Result<Self, SimError> {
         check_range("number of models", models.len() as f64, 1.0..=1e6)?;
         check_range("number of objects", count as f64, 1.0..=100.0)?;
         let mut objects = Vec::with_capacity(count);
@@ -124,9 +121,9 @@ impl Clutter {
     /// # Errors
     ///
     /// As for [`DepthSensor::measure`].
-    pub fn view<R: Rng + ?Sized>(
+    pub fn view(
         &self,
-        rng: &mut R,
+        rng: &mut SimRng,
         models: &[Model],
         camera: &PinholeCamera,
         sensor: &DepthSensor,
@@ -140,9 +137,9 @@ impl Clutter {
     /// The path starts at a random direction, at 1.5 times the distance at which all objects just
     /// fit. In equal steps, the camera approaches and moves around the scene by 40°. It always
     /// looks at the center.
-    pub fn path<R: Rng + ?Sized>(
+    pub fn path(
         &self,
-        rng: &mut R,
+        rng: &mut SimRng,
         camera: &PinholeCamera,
         images: usize,
     ) -> Vec<Isometry3<f64>> {
@@ -166,9 +163,9 @@ impl Clutter {
     /// # Errors
     ///
     /// As for [`DepthSensor::measure`].
-    pub fn view_from<R: Rng + ?Sized>(
+    pub fn view_from(
         &self,
-        rng: &mut R,
+        rng: &mut SimRng,
         camera_from_world: Isometry3<f64>,
         models: &[Model],
         camera: &PinholeCamera,
@@ -187,7 +184,7 @@ impl Clutter {
         )
     }
 
-    fn look<R: Rng + ?Sized>(&self, rng: &mut R, camera: &PinholeCamera) -> Isometry3<f64> {
+    fn look(&self, rng: &mut SimRng, camera: &PinholeCamera) -> Isometry3<f64> {
         let elevation = within(rng, &ELEVATION_DEGREES).to_radians();
         let azimuth = within(rng, &(0.0..std::f64::consts::TAU));
         let factor = within(rng, &DISTANCE_FACTOR);
@@ -229,8 +226,8 @@ pub(crate) fn looking_at_center(elevation: f64, azimuth: f64, distance: f64) -> 
 /// Observes objects on the table, given as indices of models with poses in the camera frame.
 ///
 /// A mesh in the camera frame can hide them; it is not one of the instances.
-pub(crate) fn compose<R: Rng + ?Sized>(
-    rng: &mut R,
+pub(crate) fn compose(
+    rng: &mut SimRng,
     camera_from_world: Isometry3<f64>,
     objects: impl Iterator<Item = (usize, Isometry3<f64>)>,
     hiding: Option<(&TriMesh, Isometry3<f64>)>,
@@ -252,7 +249,7 @@ pub(crate) fn compose<R: Rng + ?Sized>(
     for (index, (model, camera_from_object)) in objects.enumerate() {
         let alone = render_depth_image(models[model].mesh(), camera, &camera_from_object);
         put(&alone, index);
-        let silhouette = alone.pixels().iter().map(|z| *z > 0.0).collect();
+        let silhouette = Mask::measured(&alone);
         seen.push((model, camera_from_object, silhouette));
     }
     if let Some((mesh, pose)) = hiding {
@@ -267,7 +264,7 @@ pub(crate) fn compose<R: Rng + ?Sized>(
             Ok(SeenObject {
                 model,
                 camera_from_object,
-                silhouette: Mask::new(width, height, silhouette)?,
+                silhouette,
                 visible: Mask::new(width, height, visible)?,
             })
         })
@@ -280,12 +277,12 @@ pub(crate) fn compose<R: Rng + ?Sized>(
     })
 }
 
-pub(crate) fn within<R: Rng + ?Sized>(rng: &mut R, range: &std::ops::Range<f64>) -> f64 {
+pub(crate) fn within(rng: &mut SimRng, range: &std::ops::Range<f64>) -> f64 {
     range.start + (range.end - range.start) * rng.random::<f64>()
 }
 
 /// Draws a rotation that puts one of six sides down, followed by a rotation around the vertical.
-fn resting<R: Rng + ?Sized>(rng: &mut R) -> UnitQuaternion<f64> {
+fn resting(rng: &mut SimRng) -> UnitQuaternion<f64> {
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
     let (axis, angle) = match rng.random_range(0..6) {
         0 => (Vector3::x_axis(), 0.0),
@@ -403,7 +400,7 @@ mod tests {
             }
             assert!(of_table > table);
             for instance in &view.instances {
-                let count = |mask: &Mask| mask.pixels().iter().filter(|set| **set).count();
+                let count = |mask: &Mask| mask.n_set();
                 let (all, seen) = (count(&instance.silhouette), count(&instance.visible));
                 assert!(all > 50 && seen <= all, "{seen} of {all}");
                 hidden += usize::from(seen < all);

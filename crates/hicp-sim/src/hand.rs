@@ -1,8 +1,8 @@
 //! A hand that passes in front of an object.
 
 use hicp_core::{Isometry3, Point3, Translation3, TriMesh, UnitQuaternion, Vector3};
-use rand::Rng;
 
+use crate::SimRng;
 use crate::clutter::within;
 use crate::error::SimError;
 use crate::objects::Solid;
@@ -34,8 +34,8 @@ pub(crate) struct Passage {
 
 impl Passage {
     /// Draws a passage that hides a sphere of a radius, meters, between two times.
-    pub(crate) fn covering<R: Rng + ?Sized>(
-        rng: &mut R,
+    pub(crate) fn covering(
+        rng: &mut SimRng,
         radius: f64,
         still: (f64, f64),
     ) -> Result<Self, SimError> {
@@ -51,11 +51,7 @@ impl Passage {
     }
 
     /// Draws a passage that hides a part of the object at a time.
-    pub(crate) fn partial<R: Rng + ?Sized>(
-        rng: &mut R,
-        radius: f64,
-        at: f64,
-    ) -> Result<Self, SimError> {
+    pub(crate) fn partial(rng: &mut SimRng, radius: f64, at: f64) -> Result<Self, SimError> {
         let covering = Self::covering(rng, 0.6 * radius, (at, at))?;
         Ok(Self {
             miss: covering.half_palm * within(rng, &MISS),

@@ -1,8 +1,9 @@
 //! Defects of segmentations: masks that are too small, too large, or incomplete.
 
 use hicp_core::{Mask, PixelRegion};
-use rand::{Rng, RngExt};
+use rand::RngExt;
 
+use crate::SimRng;
 use crate::error::{SimError, check_range};
 
 /// Defects of a segmentation mask, applied in the order of the fields. The default changes nothing.
@@ -34,7 +35,7 @@ impl MaskDefects {
     /// # Errors
     ///
     /// [`SimError::Parameter`] if the share is not in [0, 1] or a radius is above 256 pixels.
-    pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, mask: &Mask) -> Result<Mask, SimError> {
+    pub fn apply(&self, rng: &mut SimRng, mask: &Mask) -> Result<Mask, SimError> {
         check_range("missing share of the mask", self.missing_share, 0.0..=1.0)?;
         check_range("threshold of the soft mask", self.soft_threshold, 0.0..=1.0)?;
         for (what, radius) in [
@@ -77,7 +78,7 @@ impl Cut {
     /// Draws a direction and places the line. Returns `None` if the share cuts nothing.
     ///
     /// Always draws exactly one number.
-    pub(crate) fn new<R: Rng + ?Sized>(rng: &mut R, mask: &Mask, share: f64) -> Option<Self> {
+    pub(crate) fn new(rng: &mut SimRng, mask: &Mask, share: f64) -> Option<Self> {
         let (sine, cosine) = (std::f64::consts::TAU * rng.random::<f64>()).sin_cos();
         let mut cut = Self {
             direction: (cosine, sine),
@@ -216,7 +217,7 @@ mod tests {
     }
 
     fn count(mask: &Mask) -> usize {
-        mask.pixels().iter().filter(|set| **set).count()
+        mask.n_set()
     }
 
     fn apply(missing_share: f64, erosion_pixels: u32, dilation_pixels: u32, mask: &Mask) -> Mask {

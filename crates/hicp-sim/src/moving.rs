@@ -1,8 +1,9 @@
 //! Image sequences of a moving object, with hands that pass in front.
 
 use hicp_core::{Isometry3, Model, PinholeCamera, Point3};
-use rand::{Rng, RngExt};
+use rand::RngExt;
 
+use crate::SimRng;
 use crate::clutter::{Clutter, ClutterView, compose, looking_at_center, within};
 use crate::error::{SimError, check_range};
 use crate::hand::Passage;
@@ -99,8 +100,8 @@ impl MovingScene {
     ///
     /// [`SimError::Parameter`] if a parameter is out of its range, or if the sequence is too short
     /// for the hand.
-    pub fn draw<R: Rng + ?Sized>(
-        rng: &mut R,
+    pub fn draw(
+        rng: &mut SimRng,
         models: &[Model],
         model: usize,
         config: &MovingConfig,
@@ -163,9 +164,9 @@ impl MovingScene {
     /// # Errors
     ///
     /// [`SimError::Parameter`] if there is no such frame; as for [`DepthSensor::measure`].
-    pub fn view<R: Rng + ?Sized>(
+    pub fn view(
         &self,
-        rng: &mut R,
+        rng: &mut SimRng,
         frame: usize,
         models: &[Model],
         camera: &PinholeCamera,
@@ -200,7 +201,7 @@ mod tests {
     use crate::{Household, stream};
 
     fn share(view: &ClutterView) -> f64 {
-        let count = |mask: &hicp_core::Mask| mask.pixels().iter().filter(|on| **on).count() as f64;
+        let count = |mask: &hicp_core::Mask| mask.n_set() as f64;
         let moving = &view.instances[0];
         count(&moving.visible) / count(&moving.silhouette)
     }

@@ -4,9 +4,10 @@ use hicp_core::{
     ColorImage, Isometry3, Mask, Model, PinholeCamera, RenderedView, Renderer, Vector3,
 };
 use hicp_raster::Rasterizer;
-use rand::{Rng, RngExt};
+use rand::RngExt;
 use rand_distr::{Distribution, Normal};
 
+use crate::SimRng;
 use crate::error::SimError;
 use crate::sampling::unit_vector;
 
@@ -31,7 +32,7 @@ pub struct Lighting {
 
 impl Lighting {
     /// Draws the light of an ordinary scene, without shadow.
-    pub fn draw<R: Rng + ?Sized>(rng: &mut R) -> Self {
+    pub fn draw(rng: &mut SimRng) -> Self {
         let mut direction = unit_vector(rng);
         // The lamp is on the side of the camera.
         direction.z = -direction.z.abs();
@@ -54,9 +55,9 @@ impl Lighting {
     /// # Errors
     ///
     /// Never if the mask has the size of the camera.
-    pub fn photograph<R: Rng + ?Sized>(
+    pub fn photograph(
         &self,
-        rng: &mut R,
+        rng: &mut SimRng,
         model: &Model,
         camera_from_object: &Isometry3<f64>,
         visible: &Mask,

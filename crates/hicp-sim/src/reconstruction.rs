@@ -3,8 +3,7 @@
 use hicp_core::{Isometry3, Model, ModelConfig, PinholeCamera, Vector3};
 use hicp_raster::render_depth_image;
 
-use rand::Rng;
-
+use crate::SimRng;
 use crate::error::{SimError, check_range};
 use crate::sampling::{object_pose, perturb};
 use crate::sensor::{DepthNoise, RelativeGaussian};
@@ -66,7 +65,7 @@ impl ReconstructionNoise {
     }
 
     /// Returns a wrong pose (`camera_from_object`).
-    fn disturbed<R: Rng + ?Sized>(&self, rng: &mut R, truth: &Isometry3<f64>) -> Isometry3<f64> {
+    fn disturbed(&self, rng: &mut SimRng, truth: &Isometry3<f64>) -> Isometry3<f64> {
         let mut perturb = |pose| {
             perturb(
                 rng,

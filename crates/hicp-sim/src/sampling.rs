@@ -1,8 +1,10 @@
 //! Poses and perturbations (§VI-A.3 to §VI-A.5).
 
 use hicp_core::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use rand::{Rng, RngExt};
+use rand::RngExt;
 use rand_distr::{Distribution, UnitSphere};
+
+use crate::SimRng;
 
 /// Rotation error per translation error of a sampling-based pose estimator, degrees per millimeter
 /// (§VI-A.5).
@@ -15,13 +17,13 @@ pub const MEAN_TRANSLATION_ERROR_METERS: f64 = 0.0062;
 pub const MEAN_ROTATION_ERROR_DEGREES: f64 = 9.5;
 
 /// Returns a uniformly distributed unit vector.
-pub fn unit_vector<R: Rng + ?Sized>(rng: &mut R) -> Vector3<f64> {
+pub fn unit_vector(rng: &mut SimRng) -> Vector3<f64> {
     let direction: [f64; 3] = UnitSphere.sample(rng);
     Vector3::from(direction)
 }
 
 /// Returns a uniformly distributed rotation (Shoemake 1992).
-pub fn rotation<R: Rng + ?Sized>(rng: &mut R) -> UnitQuaternion<f64> {
+pub fn rotation(rng: &mut SimRng) -> UnitQuaternion<f64> {
     let (u, a, b): (f64, f64, f64) = (rng.random(), rng.random(), rng.random());
     let ((sa, ca), (sb, cb)) = (
         (std::f64::consts::TAU * a).sin_cos(),
@@ -35,8 +37,8 @@ pub fn rotation<R: Rng + ?Sized>(rng: &mut R) -> UnitQuaternion<f64> {
 ///
 /// The distance is uniform in `distances` meters. The optical axis passes within `offset` meters of
 /// the object's center, so the object is never exactly in the center of the image.
-pub fn object_pose<R: Rng + ?Sized>(
-    rng: &mut R,
+pub fn object_pose(
+    rng: &mut SimRng,
     center: &Point3<f64>,
     distances: std::ops::Range<f64>,
     offset: f64,
@@ -59,8 +61,8 @@ pub fn object_pose<R: Rng + ?Sized>(
 ///
 /// |t_δ| is `translation` meters, and R_δ is a rotation by `angle` radians. Both have uniformly
 /// random directions.
-pub fn perturb<R: Rng + ?Sized>(
-    rng: &mut R,
+pub fn perturb(
+    rng: &mut SimRng,
     camera_from_object: &Isometry3<f64>,
     translation: f64,
     angle: f64,

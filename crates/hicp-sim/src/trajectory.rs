@@ -1,8 +1,8 @@
 //! Smooth random motions of an object.
 
 use hicp_core::{Isometry3, Point3, Translation3, Vector3, so3};
-use rand::Rng;
 
+use crate::SimRng;
 use crate::clutter::within;
 use crate::error::{SimError, check_range};
 use crate::sampling::{rotation, unit_vector};
@@ -48,9 +48,9 @@ impl Trajectory {
     /// # Errors
     ///
     /// [`SimError::Parameter`] if a speed or a rate is out of its range.
-    pub fn draw<R: Rng + ?Sized>(
+    pub fn draw(
         &self,
-        rng: &mut R,
+        rng: &mut SimRng,
         center: &Point3<f64>,
         mean: &Point3<f64>,
         frames: usize,
@@ -82,12 +82,7 @@ impl Trajectory {
 }
 
 /// Draws velocities between successive frames, with a highest speed of half of `limit` to `limit`.
-fn velocities<R: Rng + ?Sized>(
-    rng: &mut R,
-    frames: usize,
-    seconds: f64,
-    limit: f64,
-) -> Vec<Vector3<f64>> {
+fn velocities(rng: &mut SimRng, frames: usize, seconds: f64, limit: f64) -> Vec<Vector3<f64>> {
     let peak = limit * within(rng, &PEAK);
     let waves = [(); WAVES].map(|()| {
         let (period, phase) = (within(rng, &PERIODS), within(rng, &(0.0..1.0)));

@@ -87,8 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut errors = vec![se3::pose_distance(&given.detected, &truth).1];
     for image in 1..=5 {
         let clean = render_depth_image(&given.mesh, &given.camera, &truth);
-        let mask = clean.pixels().iter().map(|z| *z > 0.0).collect();
-        let mask = hybrid_icp::core::Mask::new(clean.width(), clean.height(), mask)?;
+        let mask = hybrid_icp::core::Mask::measured(&clean);
         let depth = RelativeGaussian { percent: 0.5 }.apply(&mut rng, &clean);
         let observation = Observation::new(depth, mask, given.camera)?;
         let step = estimator.step(&model, &observation, &moved);

@@ -43,7 +43,7 @@ const LEAST_LEFT: f64 = 0.02;
 /// let depth = (0..64 * 64).map(|i| if (22..42).contains(&(i % 64)) && (22..42).contains(&(i / 64)) { 0.6 } else { 0.8 });
 /// let depth = DepthImage::from_meters(64, 64, depth.collect())?;
 /// let mask = hybrid_icp::mask_in_box(&depth, &camera, [20.0, 20.0, 25.0, 25.0]);
-/// assert_eq!(mask.pixels().iter().filter(|set| **set).count(), 20 * 20);
+/// assert_eq!(mask.n_set(), 20 * 20);
 /// # Ok(()) }
 /// ```
 #[must_use]

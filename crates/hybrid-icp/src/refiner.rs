@@ -84,7 +84,7 @@ impl Refinement {
 /// // The plate stands half a meter in front of the camera; the detector is 4 cm off.
 /// let depth = (0..64 * 64).map(|i| if (12..52).contains(&(i % 64)) && (12..52).contains(&(i / 64)) { 0.5 } else { 0.0 });
 /// let depth = DepthImage::from_meters(64, 64, depth.collect())?;
-/// let mask = Mask::new(64, 64, depth.pixels().iter().map(|z| *z > 0.0).collect())?;
+/// let mask = Mask::measured(&depth);
 /// let observation = Observation::new(depth, mask, camera)?;
 /// let init = Isometry3::translation(0.0, 0.0, 0.54);
 ///
@@ -204,7 +204,7 @@ impl<S: Stage> Refiner<S> {
     /// # let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 2, 1], [0, 3, 2]])?);
     /// # let depth = (0..64 * 64).map(|i| if (12..52).contains(&(i % 64)) && (12..52).contains(&(i / 64)) { 0.5 } else { 0.0 });
     /// # let depth = DepthImage::from_meters(64, 64, depth.collect())?;
-    /// # let mask = Mask::new(64, 64, depth.pixels().iter().map(|z| *z > 0.0).collect())?;
+    /// # let mask = Mask::measured(&depth);
     /// let observation = Observation::new(depth, mask, camera)?;
     /// let found = Refiner::preset(Preset::Local).estimate(&model, &observation);
     /// assert!((found.outcome.camera_from_object.translation.z - 0.5).abs() < 1e-3);

@@ -39,7 +39,7 @@ use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, 
 /// for distance in [0.60_f32, 0.58, 0.56] {
 ///     let depth = hybrid_icp::raster::render_depth_image(
 ///         model.mesh(), &camera, &Isometry3::translation(0.0, 0.0, f64::from(distance)));
-///     let mask = Mask::new(64, 64, depth.pixels().iter().map(|z| *z > 0.0).collect())?;
+///     let mask = Mask::measured(&depth);
 ///     let step = estimator.step(&model, &Observation::new(depth, mask, camera)?, &motion);
 ///     assert!((step.camera_from_object.translation.z - f64::from(distance)).abs() < 1e-4);
 ///     motion = CameraMotion::new(Isometry3::translation(0.0, 0.0, -0.02))?;

@@ -237,7 +237,7 @@ fn check_code(code: &Rle) {
         .step_by(2)
         .map(|c| u64::from(*c))
         .sum();
-    assert_eq!(mask.pixels().iter().filter(|on| **on).count() as u64, set);
+    assert_eq!(mask.n_set() as u64, set);
     assert_eq!(Rle::of_mask(&mask).to_mask(), mask);
 }
 

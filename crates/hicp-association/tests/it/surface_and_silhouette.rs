@@ -30,14 +30,13 @@ impl Scene {
     fn of(model: Model, truth: Isometry3<f64>) -> Self {
         let camera = camera();
         let object = render_depth(&model, &camera, &truth);
-        let mask = object.pixels().iter().map(|z| *z > 0.0).collect();
         let behind = |z: &f32| if *z > 0.0 { *z } else { PLANE as f32 };
         let depth = object.pixels().iter().map(behind).collect();
         Self {
             model,
             truth,
             depth: DepthImage::from_meters(160, 120, depth).unwrap(),
-            exact: Mask::new(160, 120, mask).unwrap(),
+            exact: Mask::measured(&object),
         }
     }
 

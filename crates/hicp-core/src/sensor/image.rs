@@ -309,6 +309,12 @@ impl Mask {
         Self(raster, bounds.unwrap_or_default())
     }
 
+    /// Number of pixels that belong to the object. Cost: O(pixels).
+    #[must_use]
+    pub fn n_set(&self) -> usize {
+        self.0.pixels.iter().filter(|set| **set).count()
+    }
+
     /// Creates a mask from bytes, row by row: every pixel that is not 0 belongs to the object.
     ///
     /// # Errors
@@ -316,6 +322,20 @@ impl Mask {
     /// [`ImageError::PixelCount`] if `pixels` does not hold `width * height` values.
     pub fn from_u8(width: u32, height: u32, pixels: &[u8]) -> Result<Self, ImageError> {
         Self::new(width, height, pixels.iter().map(|p| *p != 0).collect())
+    }
+
+    /// Creates the mask of the pixels that have a depth, such as the silhouette of a render.
+    #[must_use]
+    pub fn measured(depth: &DepthImage) -> Self {
+        let (width, height) = (depth.width(), depth.height());
+        let pixels = depth.pixels().iter().map(|z| *z > 0.0).collect();
+        let raster = Raster {
+            width,
+            height,
+            pixels,
+        };
+        let region = bounding_region(&raster);
+        Self(raster, region)
     }
 
     /// Creates a mask in which every pixel belongs to the object.

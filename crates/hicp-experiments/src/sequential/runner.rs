@@ -238,8 +238,7 @@ impl<'a> TrajectoryRunner<'a> {
     ) -> Result<(DepthImage, Mask), Failed> {
         let subject = &self.subjects[journey.object];
         let depth = render_depth_image(subject.model.mesh(), &self.camera, truth);
-        let seen = depth.pixels().iter().map(|z| *z > 0.0).collect();
-        let mask = Mask::new(self.camera.width(), self.camera.height(), seen)?;
+        let mask = Mask::measured(&depth);
         let underlying = &self.underlying[journey.underlying].name;
         let labels = [&subject.name, underlying, "trajectory sensor"];
         let mut rng = stream(self.config.seed, &labels, (journey.index << 20) + image);

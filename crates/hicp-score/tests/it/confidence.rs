@@ -26,11 +26,10 @@ fn at() -> Isometry3<f64> {
 /// Returns the cube at [`at`] in front of a wall, with depths changed by pixel.
 fn scene(change: impl Fn(usize, f32) -> f32) -> Observation {
     let alone = render_depth(&cube(), &camera(), &at());
-    let mask = alone.pixels().iter().map(|z| *z > 0.0).collect();
     let depth = alone.pixels().iter().enumerate();
     let depth = depth.map(|(i, z)| if *z > 0.0 { change(i, *z) } else { WALL });
     let depth = DepthImage::from_meters(WIDTH, HEIGHT, depth.collect()).unwrap();
-    Observation::new(depth, Mask::new(WIDTH, HEIGHT, mask).unwrap(), camera()).unwrap()
+    Observation::new(depth, Mask::measured(&alone), camera()).unwrap()
 }
 
 fn judge(observation: &Observation, pose: &Isometry3<f64>) -> (Misfit, Confidence) {

@@ -237,7 +237,7 @@ fn parts_missing_from_the_mask_are_tolerated_on_request() {
         });
         Observation::new(scene.depth().clone(), mask.clone(), camera()).unwrap()
     };
-    let count = |mask: &Mask| mask.pixels().iter().filter(|on| **on).count() as f64;
+    let count = |mask: &Mask| mask.n_set() as f64;
     let missing = 1.0 - count(&mask) / count(whole.mask());
     assert!(missing > 0.1);
     let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
@@ -278,11 +278,8 @@ fn vsd_of_poses_equals_vsd_of_their_images() {
         assert_eq!(score.truth(), &at());
         let silhouette = |pose: &Isometry3<f64>| {
             let depth = render_depth(&model, &camera(), pose);
-            let mask = depth.pixels().iter().map(|z| *z > 0.0).collect();
-            (
-                depth.to_distance(&camera()).unwrap(),
-                Mask::new(64, 48, mask).unwrap(),
-            )
+            let mask = Mask::measured(&depth);
+            (depth.to_distance(&camera()).unwrap(), mask)
         };
         let (truth, truth_mask) = silhouette(&at());
         for _ in 0..20 {

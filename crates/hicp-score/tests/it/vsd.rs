@@ -55,7 +55,7 @@ fn mask(rows: [&str; 6]) -> Mask {
 }
 
 fn count(mask: &Mask) -> usize {
-    mask.pixels().iter().filter(|set| **set).count()
+    mask.n_set()
 }
 
 fn assert_errors(found: [f64; N_TOLERANCES], expected: [f64; N_TOLERANCES]) {

@@ -1,8 +1,9 @@
 //! Procedural textures of objects.
 
 use hicp_core::{ColorImage, MeshError, SurfaceColor, TexturedTriangle, TriMesh};
-use rand::{Rng, RngExt};
+use rand::RngExt;
 
+use crate::SimRng;
 use crate::error::SimError;
 
 /// Side of a texture, pixels. It covers a square as wide as the object.
@@ -33,7 +34,7 @@ impl Texture {
     /// # Errors
     ///
     /// Never for a mesh with fewer than 2³² triangles.
-    pub fn paint<R: Rng + ?Sized>(self, rng: &mut R, mesh: TriMesh) -> Result<TriMesh, SimError> {
+    pub fn paint(self, rng: &mut SimRng, mesh: TriMesh) -> Result<TriMesh, SimError> {
         let base = color(rng);
         let images: Result<Vec<_>, _> = (0..6).map(|_| self.draw(rng, base)).collect();
         let color = SurfaceColor::Textures {
@@ -45,7 +46,7 @@ impl Texture {
     }
 
     /// Draws one image.
-    fn draw<R: Rng + ?Sized>(self, rng: &mut R, base: [u8; 3]) -> Result<ColorImage, SimError> {
+    fn draw(self, rng: &mut SimRng, base: [u8; 3]) -> Result<ColorImage, SimError> {
         let mut pixels = vec![base; (SIDE * SIDE) as usize];
         let mut fill = |from: [u32; 2], to: [u32; 2], disc: bool, color: [u8; 3]| {
             let half = |axis: usize| f64::from(to[axis].saturating_sub(from[axis])).max(1.0) / 2.0;
@@ -104,7 +105,7 @@ impl Texture {
 }
 
 /// Draws a color.
-fn color<R: Rng + ?Sized>(rng: &mut R) -> [u8; 3] {
+fn color(rng: &mut SimRng) -> [u8; 3] {
     [(); 3].map(|()| rng.random_range(20..236))
 }
 

@@ -1,8 +1,8 @@
 //! A simulated depth sensor: distortion, missing pixels, noise and quantization.
 
 use hicp_core::{DepthImage, PinholeCamera};
-use rand::Rng;
 
+use crate::SimRng;
 use crate::error::{SimError, check_range};
 use crate::sensor::distortion::{DEPTH_EDGE_METERS, Distortion};
 use crate::sensor::noise::{DepthNoise, map_depths};
@@ -48,9 +48,9 @@ impl DepthSensor {
     /// # Errors
     ///
     /// [`SimError`] if the sizes of image and camera differ, or if a parameter is out of its range.
-    pub fn measure<R: Rng + ?Sized>(
+    pub fn measure(
         &self,
-        rng: &mut R,
+        rng: &mut SimRng,
         perfect: &DepthImage,
         camera: &PinholeCamera,
     ) -> Result<DepthImage, SimError> {

@@ -1,9 +1,9 @@
 //! Systematic errors of depth sensors: smooth distortions and fattened edges.
 
 use hicp_core::DepthImage;
-use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::SimRng;
 use crate::error::{SimError, check_range};
 
 /// Depth difference between neighboring pixels that counts as a depth edge, meters.
@@ -32,11 +32,7 @@ impl Distortion {
     /// # Errors
     ///
     /// [`SimError`] if a parameter is out of its range.
-    pub fn apply<R: Rng + ?Sized>(
-        &self,
-        rng: &mut R,
-        perfect: &DepthImage,
-    ) -> Result<DepthImage, SimError> {
+    pub fn apply(&self, rng: &mut SimRng, perfect: &DepthImage) -> Result<DepthImage, SimError> {
         let fattening = f64::from(self.fattening_pixels);
         check_range("distortion in percent", self.percent, 0.0..=50.0)?;
         check_range("fattening in pixels", fattening, -64.0..=64.0)?;
@@ -79,7 +75,7 @@ struct Field {
 }
 
 impl Field {
-    fn draw<R: Rng + ?Sized>(rng: &mut R, area: u32, width: u32, height: u32) -> Self {
+    fn draw(rng: &mut SimRng, area: u32, width: u32, height: u32) -> Self {
         let area = area.max(1);
         let (columns, rows) = (width / area + 2, height / area + 2);
         let values = (0..columns * rows).map(|_| StandardNormal.sample(rng));

@@ -7,9 +7,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use hicp_core::DepthImage;
-use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::SimRng;
 use crate::error::SimError;
 
 /// Gaussian noise with a standard deviation proportional to the depth, independent per pixel
@@ -26,7 +26,7 @@ impl RelativeGaussian {
     /// Pixels without depth stay without. If noise would make a depth negative, the depth is
     /// removed.
     #[must_use]
-    pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, depth: &DepthImage) -> DepthImage {
+    pub fn apply(&self, rng: &mut SimRng, depth: &DepthImage) -> DepthImage {
         let sigma = self.percent / 100.0;
         disturb(rng, depth, |z, unit| z * (1.0 + sigma * unit))
     }
@@ -73,7 +73,7 @@ impl AxialPolynomial {
 
     /// Returns a noisy copy of an image, as [`RelativeGaussian::apply`] does.
     #[must_use]
-    pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, depth: &DepthImage) -> DepthImage {
+    pub fn apply(&self, rng: &mut SimRng, depth: &DepthImage) -> DepthImage {
         disturb(rng, depth, |z, unit| z + self.sigma_meters(z) * unit)
     }
 }
@@ -121,7 +121,7 @@ impl StereoDisparity {
 
     /// Returns a noisy copy of an image, as [`RelativeGaussian::apply`] does.
     #[must_use]
-    pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, depth: &DepthImage) -> DepthImage {
+    pub fn apply(&self, rng: &mut SimRng, depth: &DepthImage) -> DepthImage {
         let scale = self.focal_pixels * self.baseline_meters;
         let step = self.quantization_pixels;
         disturb(rng, depth, |z, unit| {
@@ -167,7 +167,7 @@ impl DepthNoise {
     /// Pixels without depth stay without. If noise would make a depth negative, the depth is
     /// removed.
     #[must_use]
-    pub fn apply<R: Rng + ?Sized>(&self, rng: &mut R, depth: &DepthImage) -> DepthImage {
+    pub fn apply(&self, rng: &mut SimRng, depth: &DepthImage) -> DepthImage {
         match self {
             Self::None => depth.clone(),
             Self::Relative(noise) => noise.apply(rng, depth),
@@ -260,11 +260,7 @@ impl FromStr for DepthNoise {
 /// Replaces every measured depth by `measure(depth, deviate)`, with depths in meters.
 ///
 /// The deviate is standard normal.
-fn disturb<R: Rng + ?Sized>(
-    rng: &mut R,
-    depth: &DepthImage,
-    measure: impl Fn(f64, f64) -> f64,
-) -> DepthImage {
+fn disturb(rng: &mut SimRng, depth: &DepthImage, measure: impl Fn(f64, f64) -> f64) -> DepthImage {
     map_depths(depth, |z| {
         let unit: f64 = StandardNormal.sample(rng);
         measure(z, unit)

@@ -166,18 +166,15 @@ fn the_vsd_of_a_stored_case_is_reproducible() {
     assert_eq!(vsd.to_bits(), case.vsd_initial.to_bits());
     // Compare with the definition, computed from whole distance images and silhouettes.
     let image = |pose| hicp_raster::render_depth_image(model.mesh(), &camera(), pose);
-    let mask = |depth: &hicp_core::DepthImage| {
-        Mask::new(160, 120, depth.pixels().iter().map(|z| *z > 0.0).collect()).unwrap()
-    };
     let (truth, init) = (image(&case.camera_from_object), image(&case.init));
     assert_eq!(truth, case.depth);
-    assert_eq!(mask(&truth), case.mask);
+    assert_eq!(Mask::measured(&truth), case.mask);
     let distances = |depth: &hicp_core::DepthImage| depth.to_distance(&camera()).unwrap();
     let errors = hicp_score::vsd(
         &distances(&init),
-        &mask(&init),
+        &Mask::measured(&init),
         &distances(&truth),
-        &mask(&truth),
+        &Mask::measured(&truth),
         model.diameter(),
     )
     .unwrap();
@@ -322,7 +319,7 @@ fn an_occluder_hides_its_share_and_is_in_front_of_the_object() {
         ..Corruption::default()
     };
     let (depth, mask) = corruption.apply(&case).unwrap();
-    let count = |mask: &Mask| mask.pixels().iter().filter(|set| **set).count() as f64;
+    let count = |mask: &Mask| mask.n_set() as f64;
     let hidden = 1.0 - count(&mask) / count(&case.mask);
     assert!((hidden - 0.3).abs() < 0.02, "{hidden}");
     let nearest = case

@@ -34,7 +34,7 @@ impl Scene {
             UnitQuaternion::new(Vector3::new(-2.0, 0.6, 0.3)),
         );
         let clean = render_depth_image(&mesh, &camera, &truth);
-        let mask = Mask::new(640, 480, clean.pixels().iter().map(|z| *z > 0.0).collect())?;
+        let mask = Mask::measured(&clean);
         Ok(Self {
             depth: RelativeGaussian { percent: 0.5 }.apply(&mut rng, &clean),
             detected: perturb(&mut rng, &truth, 0.005, 6.0_f64.to_radians()),

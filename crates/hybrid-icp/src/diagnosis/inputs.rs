@@ -90,7 +90,7 @@ impl Inputs<'_> {
 
     /// Returns the number of pixels of the mask.
     pub(super) fn n_masked(&self) -> usize {
-        self.mask.pixels().iter().filter(|set| **set).count()
+        self.mask.n_set()
     }
 
     /// Returns the median of a value over the measured pixels of the mask that show the model at

@@ -192,8 +192,7 @@ pub fn wedge() -> TriMesh {
 /// Renders an image of a model alone, masked by its silhouette.
 pub fn observe(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> Observation {
     let depth = render_depth(model, camera, pose);
-    let mask = depth.pixels().iter().map(|z| *z > 0.0).collect();
-    let mask = Mask::new(camera.width(), camera.height(), mask).unwrap();
+    let mask = Mask::measured(&depth);
     Observation::new(depth, mask, *camera).unwrap()
 }
 
@@ -241,8 +240,7 @@ pub fn sphere_depth(center: &Vector3<f64>, radius: f64, ray: &Vector3<f64>) -> f
 
 /// Creates an observation of the whole image, masked where depth is present.
 pub fn observe_depth(depth: DepthImage, camera: &PinholeCamera) -> Observation {
-    let mask = depth.pixels().iter().map(|z| *z > 0.0).collect();
-    let mask = Mask::new(camera.width(), camera.height(), mask).unwrap();
+    let mask = Mask::measured(&depth);
     Observation::new(depth, mask, *camera).unwrap()
 }
 
