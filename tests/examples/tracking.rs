@@ -232,7 +232,7 @@ impl Counts {
 }
 
 fn visible_share(view: &ClutterView) -> f64 {
-    let count = |mask: &Mask| mask.pixels().iter().filter(|on| **on).count() as f64;
+    let count = |mask: &Mask| mask.n_set() as f64;
     let moving = &view.instances[0];
     count(&moving.visible) / count(&moving.silhouette).max(1.0)
 }

@@ -6,7 +6,6 @@ use hybrid_icp::core::{Isometry3, Mask, Model, Observation};
 
 use crate::assignment::assign_masks;
 use crate::box_mask::BoxMask;
-use crate::covered::covered_pixels;
 use crate::fault::Fault;
 use crate::mask_file::Source;
 use crate::row_status::RowStatus;
@@ -239,7 +238,7 @@ impl<'a> BopImage<'a> {
     ) -> Vec<u64> {
         let camera = self.image.camera;
         let view = refiner.workspace_mut().view(model, &camera, pose);
-        let covered: Vec<(u32, u32)> = covered_pixels(view).collect();
+        let covered: Vec<(u32, u32)> = view.covered().collect();
         let overlap = |index: &usize| {
             // If the file has changed since the first read, the mask covers nothing.
             let _ = self.read(*index);

@@ -4,8 +4,6 @@ use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, RenderedView, Vector3,
 };
 
-use crate::covered::covered_pixels;
-
 /// The creation of a mask from an estimate alone.
 ///
 /// The mask has the pixels that meet two conditions:
@@ -103,7 +101,7 @@ impl BoxMask {
 
 /// Returns the smallest box around the rendered pixels, or `None` if there are none.
 fn silhouette_box(view: &RenderedView) -> Option<PixelRegion> {
-    let pixels = covered_pixels(view).map(|(u, v)| PixelRegion {
+    let pixels = view.covered().map(|(u, v)| PixelRegion {
         u_min: u,
         v_min: v,
         u_max: u + 1,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use hicp_picture::Picture;
 use hicp_sim::{
     Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, RelativeGaussian,
     object_pose, perturb, rng,
@@ -14,8 +15,7 @@ use hybrid_icp::raster::render_depth_image;
 use hybrid_icp::score::{Score, Vsd};
 
 use crate::choice::PipelineArguments;
-use crate::outputs::{Files, check_png};
-use crate::picture::Picture;
+use crate::outputs::{Files, check_png, write_picture};
 use crate::refine::{report, warnings};
 use crate::terminal::{say, table, warn};
 
@@ -73,8 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let nearest = model.diameter().max(0.3);
     let truth = object_pose(&mut rng, &model.center(), nearest..0.6, 0.02);
     let clean = render_depth_image(model.mesh(), &camera, &truth);
-    let mask = clean.pixels().iter().map(|z| *z > 0.0).collect();
-    let mask = Mask::new(camera.width(), camera.height(), mask)?;
+    let mask = Mask::measured(&clean);
     let noise = RelativeGaussian {
         percent: arguments.noise,
     };
@@ -118,7 +117,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let caption = format!("{when}: {degrees:.2} deg and {mm:.2} mm off, MVE {mve:.3}");
         (pose, caption)
     });
-    Picture::before_and_after(&model, &observation, &captioned)?.write(&arguments.picture)?;
+    let picture = Picture::before_and_after(&model, &observation, &captioned)?;
+    write_picture(&arguments.picture, &picture)?;
 
     let reason = warnings::reason(&refined, &model, &observation, &init);
     say(format_args!(

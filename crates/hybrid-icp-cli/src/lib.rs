@@ -21,7 +21,6 @@ mod limits;
 mod objects;
 mod options;
 mod outputs;
-mod picture;
 mod pipelines;
 mod pose_json;
 mod refine;

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use hicp_picture::Picture;
 
 /// Checks that pictures have the name of a PNG file, which they are.
 pub(crate) fn check_png<'a>(
@@ -20,6 +21,11 @@ pub(crate) fn check_png<'a>(
         }
     }
     Ok(())
+}
+
+/// Writes a picture as PNG.
+pub(crate) fn write_picture(path: &Path, picture: &Picture) -> Result<(), hicp_io::IoError> {
+    hicp_io::write_rgb_png(path, picture.width, picture.height, &picture.rgb)
 }
 
 /// The files that a command reads and writes, with the options that name them.

@@ -5,9 +5,6 @@
 #![allow(clippy::cast_possible_truncation)]
 
 mod chart;
-#[path = "../../../crates/hybrid-icp-cli/src/picture/contour.rs"]
-#[allow(dead_code)]
-mod contour;
 mod curves;
 mod gallery;
 mod pairs;

@@ -10,8 +10,8 @@ use hybrid_icp::core::{
 };
 use hybrid_icp::raster::render_depth_image;
 
-use crate::contour::contours;
 use crate::svg::{Place, Svg};
+use hicp_picture::contours;
 
 /// An object and its pose.
 pub(crate) struct Placed {

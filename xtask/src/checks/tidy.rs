@@ -17,6 +17,7 @@ const LAYERS: &[(&str, u32)] = &[
     ("hicp-score", 1),
     ("hicp-fusion", 1),
     ("hicp-icp", 2),
+    ("hicp-picture", 2),
     ("hicp-switch", 3),
     ("hicp-pipeline", 4),
     ("hicp-sim", 4),

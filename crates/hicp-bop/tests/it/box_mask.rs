@@ -56,7 +56,7 @@ fn wall(z: f32) -> DepthImage {
 /// Returns the box of the set pixels: the first column and row, and one past the last ones.
 fn set(mask: &Mask) -> (u32, u32, u32, u32) {
     let region = mask.bounding_region();
-    let count = mask.pixels().iter().filter(|set| **set).count();
+    let count = mask.n_set();
     assert_eq!(count, region.area(), "the whole box is measured");
     (region.u_min, region.v_min, region.u_max, region.v_max)
 }

@@ -60,8 +60,7 @@ fn depth() -> DepthImage {
 }
 
 fn mask() -> Mask {
-    let set = depth().pixels().iter().map(|z| *z > 0.0).collect();
-    Mask::new(160, 120, set).unwrap()
+    Mask::measured(&depth())
 }
 
 /// Creates a dataset with one image of the block.

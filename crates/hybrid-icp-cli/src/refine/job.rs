@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use hicp_picture::Picture;
 use hybrid_icp::icp::Verdict;
 
 use super::inputs::{Inputs, Read};
@@ -11,8 +12,7 @@ use super::report::{self, Report};
 use super::trace::{self, TraceLines};
 use super::warnings;
 use crate::choice::PipelineArguments;
-use crate::outputs::{Files, check_png};
-use crate::picture::Picture;
+use crate::outputs::{Files, check_png, write_picture};
 use crate::terminal::{check_stdout, say, warn};
 
 /// The pipeline and the outputs.
@@ -118,7 +118,8 @@ impl JobOptions {
             let before = format!("before: MVE {:.3}", refined.mve_initial);
             let mut poses: Vec<_> = init.iter().map(|init| (init, before.clone())).collect();
             poses.push((&found, format!("{after}: MVE {:.3}", refined.mve)));
-            Picture::before_and_after(&model, &observation, &poses)?.write(path)?;
+            let picture = Picture::before_and_after(&model, &observation, &poses)?;
+            write_picture(path, &picture)?;
         }
         report.warnings.iter().for_each(warn);
         match self.output {

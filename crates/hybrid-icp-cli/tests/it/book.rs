@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use hicp_io::LengthUnit;
-use hybrid_icp::core::{DepthImage, Isometry3, PinholeCamera};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, PinholeCamera};
 use hybrid_icp::raster::render_depth_image;
 
 use crate::common::*;
@@ -65,7 +65,7 @@ fn write_other_formats(scene: &Scene, depth: &DepthImage) {
     let color_from_depth = Isometry3::translation(-0.02, 0.005, 0.0);
     scene.write("color_from_depth.txt", text(&color_from_depth));
     let seen = render_depth_image(&car(), &color, &(color_from_depth * truth()));
-    hicp_io::write_mask_png(scene.path("color_mask.png"), &mask_of(&seen)).unwrap();
+    hicp_io::write_mask_png(scene.path("color_mask.png"), &Mask::measured(&seen)).unwrap();
     scene.write(
         "color_pose.json",
         pose_json(&(color_from_depth * init)).to_string(),

@@ -133,7 +133,7 @@ impl World {
         for instance in 0..layers.len() {
             let mask = (0..count).map(|i| nearest(i).is_some_and(|(layer, _)| layer == instance));
             let mask = Mask::new(width, height, mask.collect()).unwrap();
-            assert!(mask.pixels().iter().filter(|set| **set).count() > 500);
+            assert!(mask.n_set() > 500);
             hicp_io::write_mask_png(self.mask_path(scene, image, instance), &mask).unwrap();
         }
     }

@@ -1,9 +1,7 @@
 //! Dot plots as SVG, for pages.
 
 use hicp_experiments::html_escaped;
-
-use crate::picture::text::fitted;
-use crate::picture::{AGAINST, RESULT};
+use hicp_picture::{AGAINST, RESULT, fitted};
 
 /// Width of the plot, and the left and right ends of its scale, in pixels.
 const WIDTH: u32 = 360;

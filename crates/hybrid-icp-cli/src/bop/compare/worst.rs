@@ -9,12 +9,12 @@ use base64::prelude::{BASE64_STANDARD, Engine as _};
 use hicp_bop::Scenes;
 use hicp_experiments::html_escaped;
 use hicp_io::bop::ResultRow;
+use hicp_picture::Picture;
 use hybrid_icp::core::{Mask, Observation};
 
 use crate::bop::models;
 use crate::bop::options::DatasetOptions;
 use crate::limits::limits;
-use crate::picture::Picture;
 
 /// A row whose ADI after a pipeline is among the largest.
 pub(super) struct Worst {

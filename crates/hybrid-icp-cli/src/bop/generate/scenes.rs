@@ -232,7 +232,7 @@ fn info(instance: &SeenObject) -> GroundTruthInfo {
 ///
 /// Without set pixels, all numbers of the box are -1.
 fn extent(mask: &Mask) -> (u32, [f64; 4]) {
-    let pixels = mask.pixels().iter().filter(|set| **set).count() as u32;
+    let pixels = mask.n_set() as u32;
     let region = mask.bounding_region();
     let (width, height) = (region.u_max - region.u_min, region.v_max - region.v_min);
     match pixels {

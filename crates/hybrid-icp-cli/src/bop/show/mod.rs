@@ -11,6 +11,7 @@ use anyhow::{Error, bail};
 use clap::Args;
 use hicp_bop::{Image, MaskSource, Models, Scenes, visible_objects};
 use hicp_io::bop::{Dataset, ResultRow};
+use hicp_picture::Picture;
 
 use self::estimates::{Estimates, Inspection};
 use self::lines::{grid, lines};
@@ -20,8 +21,7 @@ use super::options::{DatasetOptions, file_name};
 use super::{faults, models};
 use crate::limits::limits;
 use crate::options::positive;
-use crate::outputs::{Files, check_png};
-use crate::picture::Picture;
+use crate::outputs::{Files, check_png, write_picture};
 use crate::terminal::{say, table, warn};
 
 /// Draw the estimates of an image: outlines of the models, with their scores and errors.
@@ -145,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     outlines(&mut picture, &scenery, &estimates, &lines)?;
     let picture = with_legend(&picture, &arguments.title(), &estimates, &lines)?;
-    picture.write(&arguments.out)?;
+    write_picture(&arguments.out, &picture)?;
     let names: Vec<&str> = estimates.iter().map(|found| found.file.as_str()).collect();
     let (names, out) = (names.join(" against "), arguments.out.display());
     say(format_args!(

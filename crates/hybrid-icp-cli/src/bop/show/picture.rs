@@ -1,15 +1,15 @@
 //! The picture of `bop show`: outlines on the image, and a legend below it.
 
-use hicp_bop::{Image, Models, covered_pixels};
+use hicp_bop::{Image, Models};
+use hicp_picture::{
+    AGAINST, Align, BLACK, GRAY, Ink, LEFT, Legend, Picture, RED, RESULT, Text, font,
+};
 use hybrid_icp::core::{Mask, RenderedView, Renderer};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::VISIBILITY_TOLERANCE_METERS;
 
 use super::estimates::{Estimate, Estimates};
 use super::lines::{HEADS, Line, cells};
-use crate::picture::legend::{BLACK, GRAY, LEFT, Legend, RED, font};
-use crate::picture::text::{Align, Text};
-use crate::picture::{self, AGAINST, Ink, Picture, RESULT};
 
 /// The image and the models of a picture.
 pub(super) struct Scenery<'a> {
@@ -18,7 +18,7 @@ pub(super) struct Scenery<'a> {
 }
 
 /// The first file's lines, and the second's.
-const STYLES: [picture::Line; 2] = [RESULT, AGAINST];
+const STYLES: [hicp_picture::Line; 2] = [RESULT, AGAINST];
 
 /// Draws the outlines of all estimates, and the tag of every object in its middle.
 pub(super) fn outlines(
@@ -52,7 +52,7 @@ pub(super) fn outlines(
     picture.draw(&ink);
     let shades = tags.iter().flat_map(shade);
     let texts: Vec<Text> = shades.chain(tags.iter().cloned()).collect();
-    picture.write_texts(&texts)
+    Ok(picture.write_texts(&texts)?)
 }
 
 /// Surfaces of two models that touch may be off by as much without hiding each other, in meters.
@@ -86,7 +86,7 @@ impl Scenery<'_> {
 ///
 /// If nothing of the silhouette is visible, returns `None`.
 fn tag(tag: &str, view: &RenderedView, picture: &Picture, others: &[Text]) -> Option<Text> {
-    let shown: Vec<(u32, u32)> = covered_pixels(view).collect();
+    let shown: Vec<(u32, u32)> = view.covered().collect();
     let mean = |axis: fn(&(u32, u32)) -> u32| {
         let sum: f64 = shown.iter().map(|place| f64::from(axis(place))).sum();
         (sum / shown.len() as f64).round() as i32
@@ -120,7 +120,7 @@ fn shade(tag: &Text) -> impl Iterator<Item = Text> {
 }
 
 /// Rows of the legend except those of the objects: title, files, heads, and notes.
-const OTHER_ROWS: i32 = 4;
+const OTHER_ROWS: usize = 4;
 /// Left end of the columns of the first file, and the distance to those of the second.
 const COLUMNS: i32 = 88;
 const NEXT: i32 = 276;
@@ -134,8 +134,9 @@ pub(super) fn with_legend(
     files: &[Estimates],
     lines: &[Line],
 ) -> anyhow::Result<Picture> {
-    let n_rows = i32::try_from(lines.len())? + OTHER_ROWS;
+    let n_rows = lines.len() + OTHER_ROWS;
     let mut legend = Legend::below(picture, n_rows)?;
+    let last = i32::try_from(n_rows - 1)?;
     legend.text(title, (LEFT, 0), Align::Left, BLACK);
     legend.text("object", (LEFT, 2), Align::Left, GRAY);
     for (row, line) in (3..).zip(lines) {
@@ -156,8 +157,8 @@ pub(super) fn with_legend(
             }
         }
     }
-    legend.text(&notes(files, lines), (LEFT, n_rows - 1), Align::Left, GRAY);
-    legend.finish()
+    legend.text(&notes(files, lines), (LEFT, last), Align::Left, GRAY);
+    Ok(legend.finish()?)
 }
 
 fn is_far(estimate: &Estimate) -> bool {

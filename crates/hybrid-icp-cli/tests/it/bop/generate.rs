@@ -196,7 +196,7 @@ fn the_layout_is_that_of_the_benchmark() {
             }
             for (index, (truth, info)) in truths.iter().zip(info).enumerate() {
                 let mask = scene.read_visible_mask(im_id, index).unwrap();
-                let seen = mask.pixels().iter().filter(|set| **set).count();
+                let seen = mask.n_set();
                 assert_eq!(info.visible_pixels.unwrap() as usize, seen);
                 // Measured depth in the object's mask is near the object.
                 let z = truth.camera_from_object.translation.z;

@@ -7,7 +7,7 @@ use std::process::Command;
 use hicp_io::LengthUnit;
 use hicp_sim::{Household, perturb, rng};
 use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, PinholeCamera, Point3, TriMesh, Vector3, sample_surface, se3,
+    Isometry3, Mask, PinholeCamera, Point3, TriMesh, Vector3, sample_surface, se3,
 };
 use hybrid_icp::raster::render_depth_image;
 use serde_json::{Value, json};
@@ -125,11 +125,6 @@ pub(crate) fn write_clouds(folder: &Path, motion: &Isometry3<f64>) {
     }
 }
 
-pub(crate) fn mask_of(depth: &DepthImage) -> Mask {
-    let pixels = depth.pixels().iter().map(|z| *z > 0.0).collect();
-    Mask::new(depth.width(), depth.height(), pixels).unwrap()
-}
-
 pub(crate) fn pose_json(pose: &Isometry3<f64>) -> Value {
     let (rotation, translation) = hicp_io::pose_to_bop(pose);
     json!({"cam_R_m2c": rotation, "cam_t_m2c": translation})
@@ -187,7 +182,7 @@ impl Scene {
         let depth = render_depth_image(&mesh, &camera(), &truth());
         hicp_io::write_ply(scene.path("mesh.ply"), &mesh, LengthUnit::Meters).unwrap();
         hicp_io::write_depth_png(scene.path("depth.png"), &depth, 0.1).unwrap();
-        hicp_io::write_mask_png(scene.path("mask.png"), &mask_of(&depth)).unwrap();
+        hicp_io::write_mask_png(scene.path("mask.png"), &Mask::measured(&depth)).unwrap();
         scene.write("camera.json", FLAT_CAMERA);
         scene.write("init.json", pose_json(&off(&truth(), 5)).to_string());
         scene

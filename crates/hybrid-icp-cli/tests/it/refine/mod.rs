@@ -180,7 +180,7 @@ fn objects_out_of_view_and_odd_meshes_have_an_outcome() {
     let at_the_edge = (0..240).filter(|v| depth.get(0, *v).unwrap() > 0.0).count();
     assert!(pixels > 500 && at_the_edge > 20, "{pixels} {at_the_edge}");
     hicp_io::write_depth_png(scene.path("depth.png"), &depth, 0.1).unwrap();
-    hicp_io::write_mask_png(scene.path("mask.png"), &mask_of(&depth)).unwrap();
+    hicp_io::write_mask_png(scene.path("mask.png"), &Mask::measured(&depth)).unwrap();
     scene.write("init.json", pose_json(&off(&pose, 2)).to_string());
     let result = honest(&scene);
     assert!(result["n_pairs"].as_u64().unwrap() > 100, "{result}");
@@ -223,7 +223,7 @@ fn three_hundred_thousand_triangles_are_refined() {
     let depth = render_depth_image(&mesh, &camera(), &pose);
     hicp_io::write_ply(scene.path("mesh.ply"), &mesh, LengthUnit::Meters).unwrap();
     hicp_io::write_depth_png(scene.path("depth.png"), &depth, 0.1).unwrap();
-    hicp_io::write_mask_png(scene.path("mask.png"), &mask_of(&depth)).unwrap();
+    hicp_io::write_mask_png(scene.path("mask.png"), &Mask::measured(&depth)).unwrap();
     scene.write("init.json", pose_json(&off(&pose, 3)).to_string());
     assert_improved(&pose_of(&scene.result()), &pose);
 }

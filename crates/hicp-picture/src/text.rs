@@ -1,51 +1,77 @@
-//! Text in pictures, in a font that is part of the program.
+//! Text in pictures, in a font that is part of the crate.
 
 use std::sync::Once;
 
-use anyhow::anyhow;
 use plotters::prelude::*;
-pub(crate) use plotters::style::text_anchor::HPos as Align;
-use plotters::style::text_anchor::{Pos, VPos};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontStyle, register_font};
 
-use super::{Picture, Rgb};
+use crate::{Picture, PictureError, Rgb};
+
+/// The part of a text whose place is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Align {
+    /// The left end.
+    Left,
+    /// The middle.
+    Center,
+    /// The right end.
+    Right,
+}
 
 /// A line of text.
-#[derive(Clone)]
-pub(crate) struct Text {
-    pub(crate) text: String,
-    /// Column of the end that `align` names, and row of the middle.
-    pub(crate) at: (i32, i32),
-    pub(crate) align: Align,
+#[derive(Clone, Debug)]
+pub struct Text {
+    /// The letters.
+    pub text: String,
+    /// Column of the part that `align` names, and row of the middle.
+    pub at: (i32, i32),
+    /// The part that is at the column of `at`.
+    pub align: Align,
     /// Height of the font, pixels; even, because letters of odd heights do not align.
-    pub(crate) size: i32,
-    pub(crate) color: Rgb,
+    pub size: i32,
+    /// Its color.
+    pub color: Rgb,
 }
 
 impl Picture {
     /// Writes texts, one after the other.
-    pub(crate) fn write_texts(&mut self, texts: &[Text]) -> anyhow::Result<()> {
+    ///
+    /// # Errors
+    ///
+    /// [`PictureError::Text`] if a text cannot be drawn.
+    pub fn write_texts(&mut self, texts: &[Text]) -> Result<(), PictureError> {
         register();
+        let failed = |text: &str, reason: String| PictureError::Text {
+            text: text.to_owned(),
+            reason,
+        };
         let size = (self.width, self.height);
         let area = BitMapBackend::with_buffer(&mut self.rgb, size).into_drawing_area();
         for text in texts {
             let [red, green, blue] = text.color;
             let color = RGBColor(red, green, blue);
+            let align = match text.align {
+                Align::Left => HPos::Left,
+                Align::Center => HPos::Center,
+                Align::Right => HPos::Right,
+            };
             let style = TextStyle::from(("sans-serif", text.size).into_font())
                 .color(&color)
-                .pos(Pos::new(text.align, VPos::Center));
+                .pos(Pos::new(align, VPos::Center));
             area.draw_text(&text.text, &style, text.at)
-                .map_err(|error| anyhow!("cannot write {:?}: {error}", text.text))?;
+                .map_err(|error| failed(&text.text, error.to_string()))?;
         }
         area.present()
-            .map_err(|error| anyhow!("cannot write text: {error}"))
+            .map_err(|error| failed("", error.to_string()))
     }
 }
 
 /// Returns a text that is at most `width` pixels wide.
 ///
 /// A shortened text has an ellipsis in its middle.
-pub(crate) fn fitted(text: &str, size: i32, width: u32) -> String {
+#[must_use]
+pub fn fitted(text: &str, size: i32, width: u32) -> String {
     register();
     let font = ("sans-serif", size).into_font();
     let fits = |text: &str| font.box_size(text).is_ok_and(|(found, _)| found <= width);

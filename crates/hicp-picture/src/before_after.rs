@@ -1,14 +1,13 @@
 //! Pictures of a refinement: the object with the outlines of its model before and after.
 
-use hicp_bop::covered_pixels;
-use hybrid_icp::core::{
+use hicp_core::{
     CameraError, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, PixelRegion,
     RenderedView, Renderer,
 };
-use hybrid_icp::raster::Rasterizer;
+use hicp_raster::Rasterizer;
 
-use super::legend::{LEFT, Legend, WIDTH};
-use super::{AGAINST, Ink, Picture, RESULT};
+use crate::legend::{LEFT, Legend, WIDTH};
+use crate::{AGAINST, Ink, Picture, PictureError, RESULT};
 
 /// The least width and height that are shown of an image, in pixels of the image.
 const LEAST: [u32; 2] = [320, 160];
@@ -21,18 +20,23 @@ impl Picture {
     ///
     /// The last pose is the result; there may be one before it.
     ///
-    /// The picture contains the mask and all silhouettes, with a margin.
-    pub(crate) fn before_and_after(
+    /// The picture contains the mask and all silhouettes, with a margin. Poses are
+    /// `camera_from_object`, meters.
+    ///
+    /// # Errors
+    ///
+    /// [`PictureError`] if the picture is too large, or if a caption cannot be drawn.
+    pub fn before_and_after(
         model: &Model,
         observation: &Observation,
         poses: &[(&Isometry3<f64>, String)],
-    ) -> anyhow::Result<Self> {
+    ) -> Result<Self, PictureError> {
         let camera = observation.camera();
         let (mut rasterizer, mut view) = (Rasterizer::default(), RenderedView::default());
         let mut shown = observation.mask().pixels().to_vec();
         for (pose, _) in poses {
             rasterizer.render(model.mesh(), camera, pose, &camera.region(), &mut view);
-            for (u, v) in covered_pixels(&view) {
+            for (u, v) in view.covered() {
                 shown[v as usize * camera.width() as usize + u as usize] = true;
             }
         }
@@ -59,7 +63,7 @@ impl Picture {
             ink.outline(&view, line, |_, _, _| false);
         }
         picture.draw(&ink);
-        let mut legend = Legend::below(&picture, i32::try_from(poses.len())?)?;
+        let mut legend = Legend::below(&picture, poses.len())?;
         for (row, ((_, caption), line)) in (0..).zip(lines) {
             legend.line(caption, (LEFT, row), WIDTH - 2 * LEFT, line);
         }

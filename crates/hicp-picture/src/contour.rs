@@ -2,15 +2,15 @@
 
 use std::collections::HashSet;
 
-use hicp_bop::covered_pixels;
-use hybrid_icp::core::RenderedView;
+use hicp_core::RenderedView;
 
 /// A side between a pixel inside and a pixel outside the silhouette, as columns and rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Side {
-    pub(crate) inside: (u32, u32),
-    /// May lie outside the image.
-    pub(crate) outside: (i64, i64),
+pub struct Side {
+    /// The pixel inside.
+    pub inside: (u32, u32),
+    /// The pixel outside, which may lie outside the image.
+    pub outside: (i64, i64),
 }
 
 /// Steps of a path from corner to corner of the pixels: east, south, west and north.
@@ -25,7 +25,8 @@ const EAST: usize = 0;
 ///
 /// Each starts at the first side of its topmost row.
 /// Pixels that touch only at a corner belong to different silhouettes. Cost: the region's pixels.
-pub(crate) fn contours(view: &RenderedView) -> Vec<Vec<Side>> {
+#[must_use]
+pub fn contours(view: &RenderedView) -> Vec<Vec<Side>> {
     let pixel = |(u, v): (i64, i64)| Some((u32::try_from(u).ok()?, u32::try_from(v).ok()?));
     let shown = |place| pixel(place).filter(|(u, v)| view.depth_at(*u, *v) > 0.0);
     let side = |heading: usize, (x, y): (i64, i64)| {
@@ -37,7 +38,7 @@ pub(crate) fn contours(view: &RenderedView) -> Vec<Vec<Side>> {
     // Every closed path has a side toward the east, above a pixel of the region.
     let mut passed = HashSet::new();
     let mut paths = Vec::new();
-    for (u, v) in covered_pixels(view) {
+    for (u, v) in view.covered() {
         let start = (i64::from(u), i64::from(v));
         if passed.contains(&(u, v)) || side(EAST, start).is_none() {
             continue;
@@ -65,7 +66,7 @@ pub(crate) fn contours(view: &RenderedView) -> Vec<Vec<Side>> {
 
 #[cfg(test)]
 mod tests {
-    use hybrid_icp::core::PixelRegion;
+    use hicp_core::PixelRegion;
 
     use super::*;
 
@@ -106,7 +107,7 @@ mod tests {
         sides.dedup();
         assert_eq!(sides.len(), count);
         let mut expected = 0;
-        for (u, v) in covered_pixels(&view) {
+        for (u, v) in view.covered() {
             for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1_i64)] {
                 let next_to = |x: u32, d: i64| u32::try_from(i64::from(x) + d).unwrap();
                 let other = view.depth_at(next_to(u, du), next_to(v, dv));

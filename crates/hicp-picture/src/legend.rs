@@ -1,16 +1,19 @@
 //! Legends: rows of text and samples of lines below a picture.
 
-use super::text::{Align, Text, fitted};
-use super::{Line, Picture, Rgb};
+use crate::text::{Align, Text, fitted};
+use crate::{Line, Picture, PictureError, Rgb};
 
-pub(crate) const BLACK: Rgb = [20; 3];
-pub(crate) const GRAY: Rgb = [110; 3];
-pub(crate) const RED: Rgb = [200, 30, 30];
+/// The color of text.
+pub const BLACK: Rgb = [20; 3];
+/// The color of headings and notes.
+pub const GRAY: Rgb = [110; 3];
+/// The color of figures that are far off.
+pub const RED: Rgb = [200, 30, 30];
 
 /// The width of a legend at least, and the width that lengths refer to. Wider pictures scale them.
-pub(crate) const WIDTH: i32 = 640;
+pub const WIDTH: i32 = 640;
 /// Distance of the text from both sides.
-pub(crate) const LEFT: i32 = 12;
+pub const LEFT: i32 = 12;
 /// Height of a row.
 const ROW: i32 = 19;
 /// Half the height of the font. Letters of fonts of odd heights do not align.
@@ -19,7 +22,8 @@ const HALF_FONT: i32 = 7;
 const SAMPLE: (i32, i32) = (32, 40);
 
 /// Returns the height of the font for a picture of some width.
-pub(crate) fn font(width: u32) -> i32 {
+#[must_use]
+pub fn font(width: u32) -> i32 {
     2 * scaled(HALF_FONT, width)
 }
 
@@ -29,7 +33,8 @@ fn scaled(length: i32, width: u32) -> i32 {
 }
 
 /// A picture with white rows below it. A place is a column and the number of a row.
-pub(crate) struct Legend {
+#[derive(Clone, Debug)]
+pub struct Legend {
     canvas: Picture,
     texts: Vec<Text>,
     top: i32,
@@ -37,23 +42,32 @@ pub(crate) struct Legend {
 
 impl Legend {
     /// Starts a legend of some rows below a picture.
-    pub(crate) fn below(picture: &Picture, rows: i32) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    ///
+    /// [`PictureError::Rows`] if both together have too many rows of pixels.
+    pub fn below(picture: &Picture, rows: usize) -> Result<Self, PictureError> {
         let width = picture.width.max(WIDTH.unsigned_abs());
-        let height = scaled(ROW * rows + 12, width);
+        let height = i32::try_from(rows).unwrap_or(i32::MAX).saturating_mul(ROW);
+        let height = scaled(height.saturating_add(12), width).unsigned_abs();
+        let all = u64::from(picture.height) + u64::from(height);
+        if i32::try_from(all).is_err() {
+            return Err(PictureError::Rows { rows: all });
+        }
         Ok(Self {
-            canvas: picture.above(width, u32::try_from(height)?),
+            canvas: picture.above(width, height),
             texts: Vec::new(),
-            top: i32::try_from(picture.height)?,
+            top: i32::try_from(picture.height).unwrap_or(i32::MAX),
         })
     }
 
     /// Adds a text, shortened if it is wider than the picture.
-    pub(crate) fn text(&mut self, text: &str, place: (i32, i32), align: Align, color: Rgb) {
+    pub fn text(&mut self, text: &str, place: (i32, i32), align: Align, color: Rgb) {
         self.fit(text, place, WIDTH - 2 * LEFT, align, color);
     }
 
     /// Adds a sample of a line and its name, both within `length`.
-    pub(crate) fn line(&mut self, name: &str, place: (i32, i32), length: i32, line: Line) {
+    pub fn line(&mut self, name: &str, place: (i32, i32), length: i32, line: Line) {
         let (sample, indent) = SAMPLE;
         let (at, [sample, thickness]) = (self.at(place), [sample, 2].map(|l| self.scaled(l)));
         self.canvas.stroke(at, sample, thickness, line);
@@ -62,7 +76,11 @@ impl Legend {
     }
 
     /// Writes the texts and returns the picture with its legend.
-    pub(crate) fn finish(mut self) -> anyhow::Result<Picture> {
+    ///
+    /// # Errors
+    ///
+    /// [`PictureError::Text`] if a text cannot be drawn.
+    pub fn finish(mut self) -> Result<Picture, PictureError> {
         self.canvas.write_texts(&self.texts)?;
         Ok(self.canvas)
     }
