@@ -12,7 +12,8 @@ use crate::SimRng;
 /// and in every version.
 ///
 /// ```
-/// /// use hicp_sim::stream;
+/// use rand::Rng;
+/// use hicp_sim::stream;
 /// let mut noise_of_case_3 = stream(1, &["mug", "noise"], 3);
 /// assert_eq!(noise_of_case_3.next_u64(), stream(1, &["mug", "noise"], 3).next_u64());
 /// assert_ne!(stream(1, &["mug", "pose"], 3).next_u64(), stream(1, &["mug", "noise"], 3).next_u64());
