@@ -45,6 +45,8 @@ impl Line {
 }
 
 /// An RGB picture.
+///
+/// Drawing panics if the number of bytes is not that of the pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     /// Number of columns.
@@ -163,5 +165,25 @@ impl Picture {
         writer.write_image_data(&self.rgb)?;
         writer.finish()?;
         Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pasted_pixels_outside_of_the_picture_are_left_out() {
+        let black = Picture {
+            width: 3,
+            height: 3,
+            rgb: vec![0; 27],
+        };
+        let mut picture = Picture::white(4, 5);
+        picture.paste(&black, 2, 3);
+        picture.paste(&black, 9, 9);
+        let dark = picture.rgb.chunks_exact(3).enumerate();
+        let dark: Vec<usize> = dark.filter(|(_, p)| p[0] == 0).map(|(i, _)| i).collect();
+        assert_eq!(dark, [14, 15, 18, 19]);
     }
 }

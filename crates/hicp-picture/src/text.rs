@@ -115,11 +115,7 @@ mod tests {
 
     #[test]
     fn text_is_drawn_at_its_place() {
-        let mut picture = Picture {
-            width: 80,
-            height: 30,
-            rgb: vec![255; 3 * 80 * 30],
-        };
+        let mut picture = Picture::white(80, 30);
         let text = Text {
             text: "0.25".to_owned(),
             at: (70, 15),

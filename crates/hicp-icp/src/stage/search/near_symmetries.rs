@@ -310,7 +310,7 @@ impl Columns {
         Self(columns)
     }
 
-    /// Returns the nearest sample within a squared distance, of similar normal if there is one.
+    /// Returns the nearest sample within a squared distance, of a similar normal if one is given.
     fn nearest(
         &self,
         point: &Vector3<f32>,
