@@ -27,6 +27,8 @@ const START_RADII: f64 = 0.2;
 const SEARCHED_RADII: f64 = 0.3;
 /// Largest deviation of a pose with the state [`TrackState::Tracking`], in diameters.
 const SURE_DIAMETERS: f64 = 0.05;
+/// Time for which a pose that was searched has to be tracked before it counts as right, seconds.
+const TRIAL_SECONDS: f64 = 1.0;
 /// Largest deviation of a prediction near which an object is registered without a search.
 const NEAR_DIAMETERS: f64 = 0.4;
 
@@ -73,9 +75,8 @@ pub struct Tracker {
     matcher: Matcher,
     config: TrackerConfig,
     motion: Option<Motion>,
-    /// The motion without a pose that a search found, until the state is
-    /// [`TrackState::Tracking`].
-    without_found: Option<Motion>,
+    /// The last pose that a search found, until it has been tracked for some time.
+    trial: Option<Trial>,
     state: TrackState,
     /// Time since the image last showed the object, seconds.
     unseen: f64,
@@ -91,7 +92,7 @@ impl Tracker {
             matcher: Matcher::new(model.into(), camera),
             config,
             motion: None,
-            without_found: None,
+            trial: None,
             state: TrackState::Lost,
             unseen: 0.0,
             ambiguous: false,
@@ -105,7 +106,7 @@ impl Tracker {
         let motion = self.at_rest(camera_from_object, START_RADII);
         self.matcher.forget();
         self.motion = Some(motion).filter(|_| se3::is_finite(camera_from_object));
-        self.without_found = None;
+        self.trial = None;
         self.state = TrackState::Doubtful;
         self.unseen = 0.0;
         self.ambiguous = false;
@@ -152,8 +153,8 @@ impl Tracker {
             0.0
         };
         motion.predict(seconds);
-        if let Some(motion) = &mut self.without_found {
-            motion.predict(seconds);
+        if let Some(trial) = &mut self.trial {
+            trial.without.predict(seconds);
         }
         let diameter = self.matcher.extent.diameter;
         let (lost, mut found) = (self.state == TrackState::Lost, None);
@@ -176,18 +177,32 @@ impl Tracker {
         }
         let unsure = self.matcher.extent.deviation(&motion) > 2.0 * SURE_DIAMETERS * diameter;
         // Another surface rarely looks like the object in two images.
-        let mut confirmed = self.without_found.is_none() || seen.is_some_and(|f| f.stands_alone());
+        let mut confirmed = match &mut self.trial {
+            Some(trial) => {
+                trial.confirmed |= seen.is_some_and(|f| f.stands_alone());
+                trial.confirmed
+            }
+            None => true,
+        };
         let doubtful = unsure || !confirmed;
-        let search = |f: Found| !f.is_clear() && !f.is_hidden() && (doubtful || !f.explains());
+        let search = |f: Found| {
+            let enough = f.is_clear() && confirmed;
+            !enough && !f.is_hidden() && (doubtful || !f.explains())
+        };
         if (lost && seen.is_none()) || found.is_none_or(search) {
-            // A pose that was found but not confirmed does not bound the search.
-            let around = self.without_found.unwrap_or(motion);
+            // A pose that was found may be wrong, and does not bound the search.
+            let around = self.trial.map_or(motion, |trial| trial.without);
             let again = self.matcher.find(depth, mask, &around)?;
             let better = |again: &Found| seen.is_none_or(|s| again.merit() > s.merit() + CLEARLY);
             if let Some(again) = again.filter(better) {
                 let (again, ambiguous) = self.matcher.settle(depth, mask, again, Some(&around))?;
                 (motion, seen) = (self.at(&again), Some(again.0));
-                (self.ambiguous, self.without_found) = (ambiguous, Some(around));
+                self.ambiguous = ambiguous;
+                self.trial = Some(Trial {
+                    without: around,
+                    confirmed: false,
+                    tracked: 0.0,
+                });
                 confirmed = false;
             }
         }
@@ -204,10 +219,18 @@ impl Tracker {
             None if !lost && self.unseen <= self.config.coast_seconds => TrackState::Doubtful,
             None => TrackState::Lost,
         };
-        match self.state {
-            TrackState::Tracking => self.without_found = None,
-            TrackState::Doubtful => {}
-            TrackState::Lost => motion = self.without_found.take().unwrap_or(motion),
+        match (self.state, &mut self.trial) {
+            (TrackState::Tracking, Some(trial)) => {
+                trial.tracked += seconds;
+                if trial.tracked > TRIAL_SECONDS {
+                    self.trial = None;
+                }
+            }
+            (TrackState::Lost, Some(trial)) => {
+                motion = trial.without;
+                self.trial = None;
+            }
+            _ => {}
         }
         self.motion = Some(motion);
         Ok(Tracked {
@@ -237,6 +260,17 @@ impl Tracker {
             config.memory_seconds,
         )
     }
+}
+
+/// A pose that a search found.
+#[derive(Clone, Copy, Debug)]
+struct Trial {
+    /// The motion without it.
+    without: Motion,
+    /// `true` if another image showed the object there.
+    confirmed: bool,
+    /// Time for which the state has been [`TrackState::Tracking`] since, seconds.
+    tracked: f64,
 }
 
 fn check_size(first: &'static str, size: (u32, u32), camera: (u32, u32)) -> Result<(), ImageError> {

@@ -17,6 +17,8 @@ use super::segments::{Segment, Segments, Sphere};
 pub(super) const CLEARLY: f64 = 0.03;
 /// Difference of the logarithms of two probabilities for the same.
 const CLEAR_ODDS: f64 = 2.5;
+/// Smallest logarithm of the odds that a found pose is right, given the predicted place.
+const LIKELY: f64 = 1.5;
 /// Number of surfaces that are searched in an image.
 const SEGMENTS: usize = 2;
 /// Axes of the camera around which a search rotates the predicted pose, and the angle, radians.
@@ -32,10 +34,6 @@ const ROTATIONS: [[f64; 3]; 7] = [
 const ROTATION: f64 = 0.8;
 /// Smallest angle between the rotations of poses that look alike, degrees.
 const SPACING_DEGREES: f64 = 30.0;
-/// Factor by which the noise may rise per frame in which the object is searched.
-const RISE: f64 = 1.005;
-/// Largest noise that it rises to, in diameters.
-const MAX_NOISE: f64 = 0.5;
 
 impl Matcher {
     /// Searches for the object around its predicted place.
@@ -52,8 +50,6 @@ impl Matcher {
             center: motion.center(),
             radius: 3.0 * deviation + model.radius(),
         };
-        // The noise changes with the distance, also while the object is not seen.
-        self.noise = self.noise.map(|noise| (noise * RISE).min(MAX_NOISE));
         let size = (model.diameter(), model.mesh().area());
         let segments = Segments::new(depth, &camera, &sphere, size, mask);
         let mut fresh: Vec<Segment> = Vec::new();
@@ -80,7 +76,7 @@ impl Matcher {
             let observation =
                 self.observe(depth, mask, &pose, DIFFERENT_DIAMETERS * model.diameter())?;
             let found = self.register(&observation, &pose);
-            let Some(found) = found.filter(Found::stands_alone) else {
+            let Some(found) = found.filter(|found| self.is_likely(found, motion)) else {
                 self.rejected.add(&segment, model.diameter());
                 continue;
             };
@@ -154,6 +150,17 @@ impl Matcher {
             .is_some_and(|other| odds(&rivals[0]) - odds(other) < CLEAR_ODDS);
         let covariance = self.covariance(&observation, &rivals[0]);
         Ok(((rivals[0], covariance), ambiguous))
+    }
+
+    /// Returns whether a pose stands alone, and is not too far from the predicted place.
+    ///
+    /// Far away, more surfaces look like the object.
+    fn is_likely(&self, found: &Found, motion: &Motion) -> bool {
+        let covariance = motion.covariance().fixed_view::<3, 3>(0, 0).into_owned();
+        let shift = found.pose * self.model.center() - motion.center();
+        let inverse = covariance.try_inverse().unwrap_or_default();
+        let away = 0.5 * shift.dot(&(inverse * shift));
+        found.stands_alone() && found.log_odds() - away > LIKELY
     }
 
     /// Returns the logarithm of the probability of a pose, up to a constant.

@@ -14,7 +14,7 @@ use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, MeanVsd, SampledMve, Score};
 
 use super::extent::{DIFFERENT_DIAMETERS, Extent};
-use super::found::Found;
+use super::found::{Found, measured_noise};
 use super::motion::{Motion, Registered, moved};
 use super::region::Widening;
 use super::rejections::Rejections;
@@ -51,7 +51,7 @@ pub(super) struct Matcher {
     pub(super) look_alikes: LookAlikeCount<SampledMve, MeanVsd>,
     pub(super) workspace: Workspace,
     widening: Widening,
-    /// Standard deviation of the depth noise in the images before, in diameters, once measured.
+    /// Standard deviation of the depth noise in the images before, per depth, once measured.
     pub(super) noise: Option<f64>,
     /// The surfaces that were searched in vain.
     pub(super) rejected: Rejections,
@@ -113,7 +113,7 @@ impl Matcher {
             }
         }
         if let Some(best) = best.filter(|best| best.is_sure() && best.evidence.agrees > 0.5) {
-            let measured = best.measured_noise();
+            let measured = measured_noise(&best.evidence) / self.depth(&best.pose);
             let before = self.noise.unwrap_or(measured);
             self.noise = Some(before + 0.2 * (measured - before));
         }
@@ -166,10 +166,12 @@ impl Matcher {
         pose: &Isometry3<f64>,
         meters: f64,
     ) -> Result<Observation, ImageError> {
-        let z = (pose * self.model.center()).z.max(self.extent.radius);
-        let pixels = (self.camera.fx() * meters / z).clamp(2.0, 64.0);
+        let depths = self.depth(pose);
+        let diameter = self.extent.diameter;
+        let pixels = (self.camera.fx() * meters / (depths * diameter)).clamp(2.0, 64.0);
+        let noise = self.noise.map_or(START_NOISE, |noise| noise * depths);
         // Noise must not cut the surface at the border of the gate, which would hold it in place.
-        let meters = meters + 2.5 * self.noise.unwrap_or(START_NOISE) * self.extent.diameter;
+        let meters = meters + 2.5 * noise * diameter;
         let view = self.workspace.view(&self.model, &self.camera, pose);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Clamped.
         let around = self
@@ -197,7 +199,14 @@ impl Matcher {
         let mve = MeanVsd::default().score(&mut context, &pose);
         let (evidence, confidence) = Confidence::at(&mut context, &pose, mve, 0.0);
         let judged = (mve, evidence, confidence.probability);
-        Some(Found::new(pose, outcome.quality, judged, self.noise))
+        let noise = self.noise.map(|noise| noise * self.depth(&pose));
+        Some(Found::new(pose, outcome.quality, judged, noise))
+    }
+
+    /// Returns the depth of the object's center, in diameters.
+    fn depth(&self, pose: &Isometry3<f64>) -> f64 {
+        let z = (pose * self.model.center()).z.max(self.extent.radius);
+        z / self.extent.diameter
     }
 
     /// Returns the covariance of a registered pose around the object's center.

@@ -4,8 +4,8 @@ use hicp_core::Point3;
 
 use super::segments::Segment;
 
-/// Number of frames in which a surface is not searched again: after the first search, and at most.
-const REST: usize = 5;
+/// Number of frames after which a surface is searched again: first, and at most.
+const REST: usize = 1;
 const LONGEST_REST: usize = 80;
 /// Movement in diameters and relative change of the area above which a surface is another one.
 const OTHER_MEAN: f64 = 0.1;
@@ -84,7 +84,7 @@ mod tests {
                 rejections.add(&segment, 0.2);
             }
         }
-        assert_eq!(searched, [0, 5, 15, 35]);
+        assert_eq!(searched, [0, 1, 3, 7, 15, 31]);
         // Moved by more than a tenth of the diameter, it is another one.
         assert_eq!(rejections.fresh(&[surface(0.03)], 0.2).len(), 1);
     }

@@ -6,6 +6,10 @@ use hicp_core::{DepthImage, Mask, PinholeCamera, PixelRegion, Point3};
 const CELLS: f64 = 24.0;
 /// Step in depth between neighboring cells that separates two surfaces, in diameters.
 const JUMP_DIAMETERS: f64 = 0.1;
+/// Smallest such step, in standard deviations of the noise of the two cells.
+const JUMP_DEVIATIONS: f64 = 2.0;
+/// Distance of a pixel from the depth of its cell, in standard deviations of its noise.
+const PIXEL_DEVIATIONS: f64 = 2.5;
 /// Largest distance of a surface from its mean, in diameters.
 const EXTENT_DIAMETERS: f64 = 0.75;
 /// Smallest area of a surface, in squared diameters.
@@ -77,7 +81,8 @@ impl Segments {
                 next += 1;
                 for other in cells.neighbors(cell) {
                     let step = (cells.depth[other] - cells.depth[cell]).abs();
-                    if labels[other] == 0 && cells.depth[other] > 0.0 && step < cells.jump {
+                    let jump = cells.jump.max(cells.cell_noise * cells.depth[cell]);
+                    if labels[other] == 0 && cells.depth[other] > 0.0 && step < jump {
                         labels[other] = label;
                         queue.push(other);
                     }
@@ -125,7 +130,8 @@ impl Segments {
             let cell = cells.place(u, v);
             let z = depth.get(u, v).unwrap_or(0.0);
             let same = labels.contains(&self.labels[cell]);
-            same && z > 0.0 && (z - cells.depth[cell]).abs() < cells.jump
+            let jump = cells.jump.max(cells.pixel_noise * z);
+            same && z > 0.0 && (z - cells.depth[cell]).abs() < jump
         })
     }
 }
@@ -137,7 +143,12 @@ struct Cells {
     columns: usize,
     /// Median depth, meters; 0 outside of the sphere and without depth.
     depth: Vec<f32>,
+    /// Step in depth between two surfaces, meters.
     jump: f32,
+    /// Largest step that is only noise between neighboring cells, per depth.
+    cell_noise: f32,
+    /// Largest distance by noise of a pixel from its cell, per depth.
+    pixel_noise: f32,
 }
 
 impl Cells {
@@ -153,12 +164,11 @@ impl Cells {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // Clamped.
         let side = (across / CELLS).clamp(1.0, 16.0) as usize;
-        // Four to nine pixels of a cell are enough for its median.
-        let skip = side.div_ceil(3);
         let columns = region.width().div_ceil(side);
         let rows = region.height().div_ceil(side);
         let mut medians = Vec::with_capacity(columns * rows);
         let mut measured = Vec::with_capacity(side * side);
+        let mut deviations = Vec::new();
         for row in 0..rows {
             for column in 0..columns {
                 measured.clear();
@@ -169,23 +179,37 @@ impl Cells {
                 );
                 #[allow(clippy::cast_possible_truncation)] // At most 16.
                 let step = side as u32;
-                for v in (v..(v + step).min(region.v_max)).step_by(skip) {
-                    for u in (u..(u + step).min(region.u_max)).step_by(skip) {
+                for v in v..(v + step).min(region.v_max) {
+                    for u in u..(u + step).min(region.u_max) {
                         let inside = within.is_none_or(|mask| mask.get(u, v) == Some(true));
                         measured.extend(depth.get(u, v).filter(|z| *z > 0.0 && inside));
                     }
                 }
-                medians.push(median(&mut measured, side.div_ceil(skip).pow(2) / 2).unwrap_or(0.0));
+                let median = median(&mut measured, side * side / 2).unwrap_or(0.0);
+                if median > 0.0 {
+                    let sum: f32 = measured.iter().map(|z| (z - median).abs()).sum();
+                    deviations.push(sum / (measured.len() as f32 * median));
+                }
+                medians.push(median);
             }
         }
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depths.
         let jump = (JUMP_DIAMETERS * diameter) as f32;
+        // The mean distance from the median is 0.8 standard deviations.
+        let noise = f64::from(median(&mut deviations, 1).unwrap_or(0.0)) / 0.8;
+        // A median of n values deviates by 1.25 / √n.
+        let cell_noise = JUMP_DEVIATIONS * 1.25 * 2_f64.sqrt() / side as f64 * noise;
+        let pixel_noise = PIXEL_DEVIATIONS * noise;
+        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depths.
+        let (cell_noise, pixel_noise) = (cell_noise as f32, pixel_noise as f32);
         let mut cells = Self {
             region,
             side,
             columns,
             depth: medians,
             jump,
+            cell_noise,
+            pixel_noise,
         };
         for cell in 0..cells.depth.len() {
             if (cells.point(cell, camera) - sphere.center).norm() > sphere.radius {
@@ -329,5 +353,28 @@ mod tests {
         assert_eq!(find(0.04, 0.06, 0.03, None).found.len(), 1);
         let left = Mask::in_region(160, 120, &camera.region(), |u, _| u < 72);
         assert_eq!(find(0.04, 1.0, 0.03, Some(&left)).found.len(), 1);
+    }
+
+    #[test]
+    fn noise_does_not_separate_a_surface_into_pieces() {
+        let camera = PinholeCamera::new(200.0, 200.0, 79.5, 59.5, 160, 120).unwrap();
+        // A square of 8 cm at 0.5 m, in front of a wall.
+        let depth = (0..160 * 120).map(|i| match (i % 160, i / 160) {
+            (60..92, 40..72) => 0.5,
+            _ => 0.9,
+        });
+        let depth = DepthImage::from_meters(160, 120, depth.collect()).unwrap();
+        let noise = hicp_sim::RelativeGaussian { percent: 2.5 };
+        let depth = noise.apply(&mut hicp_sim::rng(1), &depth);
+        let sphere = Sphere {
+            center: Point3::new(0.0, 0.0, 0.5),
+            radius: 1.0,
+        };
+        let segments = Segments::new(&depth, &camera, &sphere, (0.12, 0.03), None);
+        let areas: Vec<f64> = segments.found.iter().map(|s| s.area).collect();
+        assert!((areas[0] / 0.0064 - 1.0).abs() < 0.1, "{areas:?}");
+        assert!(areas.len() < 4, "{areas:?}");
+        let pixels = segments.mask(&segments.found[0], &depth).n_set();
+        assert!((900..=1024).contains(&pixels), "{pixels}");
     }
 }
