@@ -15,9 +15,11 @@ use super::segments::{Segment, Segments, Sphere};
 
 /// Difference in merit by which a pose is clearly better than another one.
 pub(super) const CLEARLY: f64 = 0.03;
-/// Difference of the logarithms of two probabilities for the same.
+/// Difference in MVE by which a pose is clearly better than one that looks like it, and the same
+/// in logarithms of their probabilities.
+const CLEAR_MVE: f64 = 0.01;
 const CLEAR_ODDS: f64 = 2.5;
-/// Smallest logarithm of the odds that a found pose is right, given the predicted place.
+/// Smallest logarithm of the odds that a found pose is right.
 const LIKELY: f64 = 1.5;
 /// Number of surfaces that are searched in an image.
 const SEGMENTS: usize = 2;
@@ -58,7 +60,7 @@ impl Matcher {
                 fresh.push(segment);
             }
         }
-        let mut best: Option<Found> = None;
+        let mut best: Option<(f64, Found)> = None;
         for segment in fresh {
             let behind = 0.25 * model.diameter() / segment.mean.coords.norm();
             let center = segment.mean.coords * (1.0 + behind);
@@ -76,19 +78,20 @@ impl Matcher {
             let observation =
                 self.observe(depth, mask, &pose, DIFFERENT_DIAMETERS * model.diameter())?;
             let found = self.register(&observation, &pose);
-            let Some(found) = found.filter(|found| self.is_likely(found, motion)) else {
+            let found = found.filter(Found::stands_alone);
+            let found = found.map(|found| (self.log_odds(&found, motion), found));
+            let Some((odds, found)) = found.filter(|(odds, _)| *odds > LIKELY) else {
                 self.rejected.add(&segment, model.diameter());
                 continue;
             };
-            let odds = |found: &Found| self.odds(found, Some(motion));
-            if best.is_none_or(|best| odds(&best) < odds(&found)) {
-                best = Some(found);
+            if best.is_none_or(|(before, _)| before < odds) {
+                best = Some((odds, found));
             }
             if found.is_clear() {
                 break;
             }
         }
-        Ok(best)
+        Ok(best.map(|(_, found)| found))
     }
 
     /// Returns the best registration from several rotations around the axes of the camera.
@@ -152,23 +155,22 @@ impl Matcher {
         Ok(((rivals[0], covariance), ambiguous))
     }
 
-    /// Returns whether a pose stands alone, and is not too far from the predicted place.
+    /// Returns the logarithm of the odds that a pose is right, given the predicted place.
     ///
     /// Far away, more surfaces look like the object.
-    fn is_likely(&self, found: &Found, motion: &Motion) -> bool {
+    fn log_odds(&self, found: &Found, motion: &Motion) -> f64 {
         let covariance = motion.covariance().fixed_view::<3, 3>(0, 0).into_owned();
         let shift = found.pose * self.model.center() - motion.center();
         let inverse = covariance.try_inverse().unwrap_or_default();
-        let away = 0.5 * shift.dot(&(inverse * shift));
-        found.stands_alone() && found.log_odds() - away > LIKELY
+        found.log_odds() - 0.5 * shift.dot(&(inverse * shift))
     }
 
-    /// Returns the logarithm of the probability of a pose, up to a constant.
+    /// Returns the logarithm of the probability of one of several similar poses, up to a constant.
     fn odds(&self, found: &Found, motion: Option<&Motion>) -> f64 {
         let away = motion.map_or(0.0, |motion| {
             self.extent.distance(&found.pose, motion.pose()) / self.extent.deviation(motion)
         });
-        CLEAR_ODDS / CLEARLY * found.merit() - 0.5 * away * away
+        -CLEAR_ODDS / CLEAR_MVE * found.mve - 0.5 * away * away
     }
 
     /// Returns whether a pose differs from others.
