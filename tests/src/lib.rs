@@ -5,7 +5,6 @@ pub mod fuzz;
 pub mod mugs;
 pub mod nees;
 pub mod painted;
-pub mod room;
 pub mod starts;
 pub mod tabletop;
 pub mod ycbv;

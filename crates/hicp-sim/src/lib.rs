@@ -55,10 +55,7 @@ pub use sensor::{
 };
 pub use stream::stream;
 pub use trajectory::Trajectory;
-pub use tsdf::{
-    Component, EmptyPixels, MAX_VOXELS, ScalarGrid, TsdfConfig, TsdfVolume, Unseen, components,
-    join,
-};
+pub use tsdf::{Component, MAX_VOXELS, ScalarGrid, TsdfConfig, TsdfVolume, components, join};
 
 /// The random generator of all simulations: small, fast, and the same on every machine and in every
 /// version.

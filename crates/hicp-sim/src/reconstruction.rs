@@ -8,7 +8,7 @@ use crate::error::{SimError, check_range};
 use crate::sampling::{object_pose, perturb};
 use crate::sensor::{DepthNoise, RelativeGaussian};
 use crate::stream::stream;
-use crate::tsdf::{EmptyPixels, TsdfConfig, TsdfVolume, Unseen};
+use crate::tsdf::{TsdfConfig, TsdfVolume};
 use crate::tsdf::{components, join};
 
 /// The errors of the images from which a model is reconstructed.
@@ -198,9 +198,9 @@ impl Reconstruction {
             let depth = render_depth_image(model.mesh(), &self.camera, &truth);
             let depth = noise.depth.apply(&mut of("noise"), &depth);
             let pose = noise.disturbed(&mut of("error"), &truth);
-            volume.integrate(&depth, &believed, &pose, EmptyPixels::Free)?;
+            volume.integrate(&depth, &believed, &pose)?;
         }
-        let parts = components(&volume.surface(Unseen::Solid)?)?;
+        let parts = components(&volume.surface()?)?;
         // Only parts that face outward count; a part that faces inward is the wall of a cavity.
         let largest = parts
             .iter()

@@ -14,7 +14,7 @@ use hicp_core::{Point3, TriMesh, Vector3};
 
 use crate::error::SimError;
 
-/// Samples of a scalar field on a regular grid: negative inside, NaN if unknown.
+/// Finite samples of a scalar field on a regular grid, negative inside.
 #[derive(Clone, Debug)]
 pub struct ScalarGrid {
     /// Position of sample (0, 0, 0), meters.
@@ -35,9 +35,8 @@ const VERTEX_MARGIN: f32 = 0.01;
 impl ScalarGrid {
     /// Returns the surface at which the field changes its sign, facing the positive side.
     ///
-    /// The surface is manifold and consistently wound. It is closed if every sample is known and
-    /// the samples at the border of the grid are positive. Cells with an unknown sample are
-    /// skipped, and the surface ends there. Vertices are interpolated linearly.
+    /// The surface is manifold and consistently wound. It is closed if the samples at the border of
+    /// the grid are positive. Vertices are interpolated linearly.
     ///
     /// Cost: O(samples).
     ///
@@ -68,9 +67,6 @@ impl ScalarGrid {
                 for i in 0..nx - 1 {
                     let corner = |c: usize| self.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
                     let values: [f32; 8] = std::array::from_fn(|c| self.values[corner(c)]);
-                    if values.iter().any(|value| value.is_nan()) {
-                        continue;
-                    }
                     let inside = (0..8)
                         .filter(|c| values[*c] < 0.0)
                         .fold(0, |bits, c| bits | 1 << c);
@@ -354,20 +350,6 @@ mod tests {
             let radius = (p - Point3::new(center, center, center)).norm();
             assert!((radius - 0.08).abs() < 2e-4, "{radius}");
         }
-    }
-
-    #[test]
-    fn unknown_samples_open_the_surface() {
-        let half = grid(12, |i, j, k| {
-            if k > 6 {
-                f32::NAN
-            } else {
-                f32::hypot(i as f32 - 5.5, j as f32 - 5.5) - 3.2
-            }
-        });
-        let mesh = half.surface().unwrap();
-        assert_eq!(mesh.facing(), Facing::Unknown);
-        assert!(mesh.vertices().iter().all(|p| p.z <= 0.06));
     }
 
     #[test]

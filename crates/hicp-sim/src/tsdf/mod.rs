@@ -6,4 +6,4 @@ mod volume;
 
 pub use components::{Component, components, join};
 pub use meshing::ScalarGrid;
-pub use volume::{EmptyPixels, MAX_VOXELS, TsdfConfig, TsdfVolume, Unseen};
+pub use volume::{MAX_VOXELS, TsdfConfig, TsdfVolume};

@@ -26,28 +26,6 @@ pub struct TsdfConfig {
     pub truncation_meters: f64,
 }
 
-/// The meaning of a pixel without depth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EmptyPixels {
-    /// The sensor did not measure: nothing is known along the ray.
-    Unknown,
-    /// The ray hits nothing, as in the render of a single object.
-    // Open: pixels without depth in a reconstruction: §VI-B.3. The renders of a single object are
-    // empty around it, so these rays carve.
-    Free,
-}
-
-/// The meaning of a voxel that no image reached, for extracting the surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unseen {
-    /// The inside of the object. The surface is then closed, also along the border of the volume.
-    // Open: voxels that no image reached: §VI-B.3. They count as inside, so that reconstructions
-    // are closed.
-    Solid,
-    /// Unknown. The surface ends there.
-    Open,
-}
-
 /// A volume into which depth images are integrated.
 ///
 /// Every voxel stores the weighted mean of its signed distances to the observed surfaces along the
@@ -129,6 +107,8 @@ impl TsdfVolume {
 
     /// Integrates a depth image taken at `camera_from_volume`, in meters.
     ///
+    /// The ray of a pixel without depth hits nothing, as in the render of a single object.
+    ///
     /// Cost: O(voxels), some nanoseconds each.
     ///
     /// # Errors
@@ -139,7 +119,6 @@ impl TsdfVolume {
         depth: &DepthImage,
         camera: &PinholeCamera,
         camera_from_volume: &Isometry3<f64>,
-        empty: EmptyPixels,
     ) -> Result<(), SimError> {
         let (width, height) = (depth.width(), depth.height());
         if (width, height) != (camera.width(), camera.height()) {
@@ -178,9 +157,9 @@ impl TsdfVolume {
                     let measured =
                         f64::from(depth.pixels()[v as usize * width as usize + u as usize]);
                     if measured <= 0.0 {
-                        if empty == EmptyPixels::Free {
-                            merge(voxel, truncation, 1.0);
-                        }
+                        // Open: pixels without depth in a reconstruction: §VI-B.3. The renders of a
+                        // single object are empty around it, so these rays carve.
+                        merge(voxel, truncation, 1.0);
                         continue;
                     }
                     let along_axis = measured - p.z;
@@ -204,8 +183,8 @@ impl TsdfVolume {
 
     /// Returns the surface between free space (positive) and the inside.
     ///
-    /// With [`Unseen::Solid`], the surface is closed; with [`Unseen::Open`], it ends at unseen
-    /// voxels. Normals point to free space. The surface is always manifold, see
+    /// Voxels that no image reached count as inside. The surface is closed, also along the border
+    /// of the volume, and normals point to free space. It is always manifold, see
     /// [`ScalarGrid::surface`]. It may have several parts, including cavities; see
     /// [`components`](crate::components).
     ///
@@ -213,46 +192,40 @@ impl TsdfVolume {
     ///
     /// # Errors
     ///
-    /// [`SimError::NoSurface`] if there is no surface.
-    pub fn surface(&self, unseen: Unseen) -> Result<TriMesh, SimError> {
-        let solid = unseen == Unseen::Solid;
+    /// [`SimError::NoSurface`] if there is no surface, or if no image reached a voxel.
+    pub fn surface(&self) -> Result<TriMesh, SimError> {
+        let no_surface = SimError::NoSurface {
+            images: self.images,
+        };
+        if self.voxels.iter().all(|(_, weight)| *weight <= 0.0) {
+            return Err(no_surface);
+        }
         #[allow(clippy::cast_possible_truncation)]
         // f32 is the precision of voxels.
         let truncation = self.config.truncation_meters as f32;
-        let value = |(distance, weight): &(f32, f32)| match (*weight > 0.0, solid) {
-            (true, _) => *distance,
-            (false, true) => -truncation,
-            (false, false) => f32::NAN,
-        };
-        let grid = if solid {
-            // A layer of free space around the volume closes the surface.
-            let size = self.size.map(|n| n + 2);
-            let mut values = vec![truncation; size.iter().product()];
-            for (row, k_j) in self.voxels.chunks_exact(self.size[0]).zip(0..) {
-                let (j, k) = (k_j % self.size[1] + 1, k_j / self.size[1] + 1);
-                let start = (k * size[1] + j) * size[0] + 1;
-                for (new, voxel) in values[start..start + row.len()].iter_mut().zip(row) {
-                    *new = value(voxel);
+        // A layer of free space around the volume closes the surface.
+        let size = self.size.map(|n| n + 2);
+        let mut values = vec![truncation; size.iter().product()];
+        for (row, k_j) in self.voxels.chunks_exact(self.size[0]).zip(0..) {
+            let (j, k) = (k_j % self.size[1] + 1, k_j / self.size[1] + 1);
+            let start = (k * size[1] + j) * size[0] + 1;
+            for (new, (distance, weight)) in values[start..start + row.len()].iter_mut().zip(row) {
+                *new = *distance;
+                if *weight <= 0.0 {
+                    // Open: voxels that no image reached: §VI-B.3. They count as inside, so that
+                    // reconstructions are closed.
+                    *new = -truncation;
                 }
             }
-            ScalarGrid {
-                origin: self.config.min - Vector3::repeat(self.config.voxel_meters),
-                spacing: self.config.voxel_meters,
-                size,
-                values,
-            }
-        } else {
-            ScalarGrid {
-                origin: self.config.min,
-                spacing: self.config.voxel_meters,
-                size: self.size,
-                values: self.voxels.iter().map(value).collect(),
-            }
+        }
+        let grid = ScalarGrid {
+            origin: self.config.min - Vector3::repeat(self.config.voxel_meters),
+            spacing: self.config.voxel_meters,
+            size,
+            values,
         };
         match grid.surface() {
-            Err(SimError::Mesh(_)) => Err(SimError::NoSurface {
-                images: self.images,
-            }),
+            Err(SimError::Mesh(_)) => Err(no_surface),
             result => result,
         }
     }

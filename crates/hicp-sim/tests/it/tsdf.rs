@@ -5,8 +5,8 @@ use std::collections::{HashMap, HashSet};
 use hicp_core::{Facing, Model, PinholeCamera, Point3, TriMesh};
 use hicp_raster::render_depth_image;
 use hicp_sim::{
-    EmptyPixels, Household, Reconstruction, ReconstructionNoise, SimError, Solid, TsdfConfig,
-    TsdfVolume, Unseen, WrongPose, components, object_pose, rng,
+    Household, Reconstruction, ReconstructionNoise, SimError, Solid, TsdfConfig, TsdfVolume,
+    WrongPose, components, object_pose, rng,
 };
 
 fn camera() -> PinholeCamera {
@@ -81,11 +81,9 @@ fn an_integrated_sphere_is_a_closed_manifold_with_its_radius() {
     for _ in 0..60 {
         let pose = object_pose(&mut rng, &center, 0.3..0.6, 0.02);
         let depth = render_depth_image(&mesh, &camera(), &pose);
-        volume
-            .integrate(&depth, &camera(), &pose, EmptyPixels::Free)
-            .unwrap();
+        volume.integrate(&depth, &camera(), &pose).unwrap();
     }
-    let surface = volume.surface(Unseen::Solid).unwrap();
+    let surface = volume.surface().unwrap();
     assert_eq!(surface.facing(), Facing::Outward);
     assert_eq!(euler_characteristic(&surface), 2);
     assert_eq!(components(&surface).unwrap().len(), 1);
@@ -108,7 +106,7 @@ fn an_integrated_sphere_is_a_closed_manifold_with_its_radius() {
 }
 
 #[test]
-fn unseen_voxels_are_solid_or_open() {
+fn unseen_voxels_are_solid() {
     let center = Point3::origin();
     let mesh = sphere(&center);
     let config = TsdfConfig {
@@ -119,27 +117,17 @@ fn unseen_voxels_are_solid_or_open() {
     };
     let mut volume = TsdfVolume::new(config).unwrap();
     assert_eq!(
-        volume.surface(Unseen::Open).unwrap_err(),
+        volume.surface().unwrap_err(),
         SimError::NoSurface { images: 0 }
     );
     let pose = hicp_core::Isometry3::translation(0.0, 0.0, 0.5);
     let depth = render_depth_image(&mesh, &camera(), &pose);
-    volume
-        .integrate(&depth, &camera(), &pose, EmptyPixels::Unknown)
-        .unwrap();
-    let (solid, open) = (
-        volume.surface(Unseen::Solid).unwrap(),
-        volume.surface(Unseen::Open).unwrap(),
-    );
+    volume.integrate(&depth, &camera(), &pose).unwrap();
+    let solid = volume.surface().unwrap();
     // The surface is closed, but an unreached voxel between two rays may be a separate part.
     assert_manifold(&solid);
     let parts = components(&solid).unwrap();
     assert!(parts[0].volume > 0.0 && parts[0].area > 0.99 * solid.area());
-    assert_eq!(open.facing(), Facing::Unknown);
-    // The open surface contains only measured points that face the camera.
-    for p in open.vertices() {
-        assert!(p.z < 0.0 && (p.coords.norm() - 0.08).abs() < 0.005, "{p}");
-    }
 }
 
 #[test]
