@@ -132,7 +132,7 @@ pub(crate) fn cases() -> Vec<Case> {
     cases
 }
 
-fn poses(scene: &Scene) -> [(&'static str, Isometry3<f64>); 9] {
+fn poses(scene: &Scene) -> [(&'static str, Isometry3<f64>); 10] {
     let moved = |translation: Vector3<f64>| {
         Isometry3::from_parts(Translation3::from(translation), scene.truth.rotation)
     };
@@ -144,6 +144,10 @@ fn poses(scene: &Scene) -> [(&'static str, Isometry3<f64>); 9] {
         ("a pose behind the camera", moved(-t)),
         ("a pose outside the image", moved(t + Vector3::x() * 5.0)),
         ("a pose around the camera", moved(Vector3::zeros())),
+        (
+            "a distance beyond the range of f32",
+            moved(Vector3::new(t.x, t.y, 1e300)),
+        ),
         (
             "a translation of NaN",
             moved(Vector3::new(t.x, f64::NAN, t.z)),

@@ -1,6 +1,6 @@
 //! Selection of the observed points.
 
-use hicp_core::{Context, Isometry3, Problem, RigidTransform, Surfel, se3};
+use hicp_core::{Context, Isometry3, Point3, Problem, RigidTransform, Surfel, se3};
 
 use crate::selection::point_selection::PointSelection;
 use crate::stride::Stride;
@@ -12,7 +12,7 @@ use crate::stride::Stride;
 /// the inverse of the initial estimate. With an association that searches the observation, every
 /// point would find itself.
 ///
-/// If the estimate is not finite, nothing is selected. Cost: O(pixels of the grid).
+/// If the estimate is not finite as `f32`, nothing is selected. Cost: O(pixels of the grid).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObservedSurface {
     /// Spacing of the selected pixels.
@@ -36,10 +36,12 @@ impl PointSelection for ObservedSurface {
         source: &mut Vec<Surfel>,
     ) {
         let object_from_camera = camera_from_object.inverse();
-        if !se3::is_finite(&object_from_camera) {
+        let mover = RigidTransform::new(&object_from_camera);
+        // Points have f32, which a finite translation may exceed.
+        let origin = mover.point(&Point3::origin());
+        if !se3::is_finite(&object_from_camera) || !origin.iter().all(|x| x.is_finite()) {
             return;
         }
-        let mover = RigidTransform::new(&object_from_camera);
         let Some(observation) = context.problem.observation() else {
             return;
         };
