@@ -136,17 +136,12 @@ fn weights_stay_finite_and_not_negative() {
     filters.push(Box::new(ConstantWeight { weight: -1.0 }));
     for (name, mut filter) in filters.into_iter().enumerate() {
         for list in [&pairs[..], &pairs[..1], &[]] {
-            let first = scene().filter(&mut filter, list);
-            for pair in &first {
+            for pair in scene().filter(&mut filter, list) {
                 assert!(
                     pair.weight.is_finite() && pair.weight >= 0.0,
                     "{name} {pair:?}"
                 );
             }
-            assert_eq!(
-                format!("{:?}", scene().filter(&mut filter, list)),
-                format!("{first:?}")
-            );
         }
     }
 }

@@ -5,51 +5,16 @@
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-use crate::common::{
-    Fixed, Random, Scene, ball_scene, blind_scene, box_mesh, hostile_poses, scene_of,
-};
+use crate::common::{Fixed, Random, Scene, ball_scene, blind_scene, box_mesh, scene_of};
 use hicp_association::{
     AllSamples, Length, NormalSpace, ObservedSurface, PointSelection, RandomSample, StableSampling,
-    Stride, UniformCount, VisibleSide, VisibleSurface, VoxelGrid, WithoutBoundary,
+    Stride, UniformCount, VisibleSurface, VoxelGrid, WithoutBoundary,
 };
 use hicp_core::{
-    Context, Isometry3, Matrix6, Point3, RenderCache, Surfel, UnitVector3, Vector3, Vector6,
+    Context, Isometry3, Matrix6, Point3, RenderCache, Surfel, UnitQuaternion, UnitVector3, Vector3,
+    Vector6,
 };
 use proptest::prelude::*;
-
-fn all_selections() -> Vec<Box<dyn PointSelection>> {
-    vec![
-        Box::new(AllSamples),
-        Box::new(VisibleSurface::default()),
-        Box::new(VisibleSide { count: 100 }),
-        Box::new(ObservedSurface::default()),
-        Box::new(UniformCount {
-            inner: VisibleSurface::default(),
-            count: 50,
-        }),
-        Box::new(RandomSample {
-            inner: VisibleSurface::default(),
-            count: 50,
-            seed: 4,
-        }),
-        Box::new(VoxelGrid::new(
-            VisibleSurface::default(),
-            Length::Meters(0.02),
-        )),
-        Box::new(NormalSpace::new(VisibleSurface::default(), 50, 3)),
-        Box::new(StableSampling::new(VisibleSurface::default(), 50)),
-        Box::new(WithoutBoundary::default()),
-        Box::new(StableSampling::new(
-            NormalSpace::new(WithoutBoundary::default(), 80, 2),
-            20,
-        )),
-        Box::new(UniformCount::<AllSamples>::default()),
-        Box::new(RandomSample::<AllSamples>::default()),
-        Box::new(VoxelGrid::<AllSamples>::default()),
-        Box::new(NormalSpace::<AllSamples>::default()),
-        Box::new(StableSampling::<AllSamples>::default()),
-    ]
-}
 
 /// Returns the positions of `chosen` in `all`, and panics unless it is a subset in order.
 fn positions(all: &[Surfel], chosen: &[Surfel]) -> Vec<usize> {
@@ -68,16 +33,8 @@ fn select_fixed(selection: &mut impl PointSelection) -> Vec<Surfel> {
 }
 
 #[test]
-fn every_selection_is_deterministic_and_clones_by_value() {
-    let (scene, other) = (ball_scene(), scene_of(box_mesh(0.05, 0.07, 0.03), 0.0, 3));
-    for (mut used, mut fresh) in all_selections().into_iter().zip(all_selections()) {
-        let pose = scene.nearby(1);
-        let first = scene.select(&mut used, &pose);
-        assert!(!first.is_empty(), "{}", used.name());
-        other.select(&mut used, &other.truth);
-        assert_eq!(scene.select(&mut used, &pose), first, "{}", used.name());
-        assert_eq!(scene.select(&mut fresh, &pose), first, "{}", used.name());
-    }
+fn a_used_voxel_grid_equals_a_new_one() {
+    let scene = ball_scene();
     let mut used = VoxelGrid::new(AllSamples, Length::Meters(0.02));
     scene.select(&mut used, &scene.truth);
     assert_eq!(used.clone(), used);
@@ -87,19 +44,12 @@ fn every_selection_is_deterministic_and_clones_by_value() {
 }
 
 #[test]
-fn hostile_input_does_not_panic() {
+fn impossible_poses_select_nothing_and_counts_may_be_zero() {
     for scene in [ball_scene(), blind_scene()] {
-        for mut selection in all_selections() {
-            for pose in hostile_poses() {
-                scene.select(&mut selection, &pose);
-            }
-        }
-        for pose in &hostile_poses()[..2] {
-            assert!(
-                scene
-                    .select(&mut ObservedSurface::default(), pose)
-                    .is_empty()
-            );
+        for translation in [[f64::NAN, 0.0, 0.5], [0.0, f64::INFINITY, 0.5]] {
+            let pose = Isometry3::from_parts(translation.into(), UnitQuaternion::identity());
+            let found = scene.select(&mut ObservedSurface::default(), &pose);
+            assert!(found.is_empty());
         }
     }
     for points in [0, 1, 2] {

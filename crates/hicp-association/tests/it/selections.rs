@@ -1,13 +1,10 @@
 //! Tests of point selections: the pixels and normals of the visible surface, and all samples.
 
 use crate::support::{Numbers, RayCaster, cuboid, observe, pose, render_depth, wedge};
-use hicp_association::{
-    AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, Stride,
-    VisibleSurface,
-};
+use hicp_association::{AllSamples, PointSelection, Stride, VisibleSurface};
 use hicp_core::{
-    Context, Correspondences, Isometry3, Model, ModelConfig, Observation, PinholeCamera, Problem,
-    RenderCache, Surfel, TriMesh,
+    Context, Isometry3, Model, ModelConfig, Observation, PinholeCamera, Problem, RenderCache,
+    Surfel, TriMesh,
 };
 
 fn camera() -> PinholeCamera {
@@ -154,40 +151,4 @@ fn all_samples_selects_every_sample() {
         model.samples()
     );
     assert_eq!(model.samples().len(), 77);
-}
-
-#[test]
-fn boxed_and_static_components_give_equal_bits() {
-    let model = Model::new(wedge());
-    let at = pose(0.0, 0.0, 0.25, 0.4, 0.2, 0.1);
-    let observation = observe(&model, &camera(), &at);
-    let visible = VisibleSurface::default();
-    let mut boxed: Box<dyn PointSelection> = Box::new(visible);
-    let source = select(&mut { visible }, &model, &observation, &at);
-    assert_eq!(select(&mut boxed, &model, &observation, &at), source);
-    assert_eq!(boxed.name(), "visible-surface");
-    assert_eq!(AllSamples.name(), "all-samples");
-
-    let run = |association: &mut dyn DataAssociation| {
-        let mut renders = RenderCache::new(RayCaster);
-        let mut context = Context::new(Problem::new(&model, &observation), &mut renders);
-        let mut pairs = Correspondences::new();
-        association.associate(
-            &mut context,
-            &source,
-            &pose(0.001, 0.0, 0.25, 0.4, 0.2, 0.1),
-            &mut pairs,
-        );
-        pairs
-    };
-    let nearest = NearestNeighbor::default();
-    let mut boxes: [Box<dyn DataAssociation>; 2] =
-        [Box::new(Projective), Box::new(nearest.clone())];
-    assert_eq!(run(&mut boxes[0]), run(&mut { Projective }));
-    assert_eq!(run(&mut boxes[1]), run(&mut { nearest }));
-    assert!(!run(&mut boxes[0]).is_empty() && !run(&mut boxes[1]).is_empty());
-    assert_eq!(
-        boxes.map(|b| DataAssociation::name(&b)),
-        ["projective", "nearest-neighbor"]
-    );
 }

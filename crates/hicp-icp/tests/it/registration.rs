@@ -281,63 +281,6 @@ fn pitfall_8_runs_repeat_to_the_bit_in_every_workspace() {
     }
 }
 
-#[test]
-fn boxed_components_give_the_bits_of_static_ones() {
-    let model = Model::new(wedge());
-    let observation = observe(&model, &camera(), &truth());
-    let mut numbers = Numbers(404);
-    let mut refined = 0;
-    for _ in 0..8 {
-        let init = nudged(&mut numbers, 6.0, 0.006);
-        let filter = || (MaxDistance::diameters(0.3),);
-        let mut fixed = Icp {
-            selection: VISIBLE,
-            association: Projective,
-            filter: filter(),
-            metric: PointToPlane,
-            stop: stop(),
-        };
-        let mut boxed: Box<dyn Stage> = Box::new(Icp {
-            selection: Box::new(VISIBLE) as Box<dyn PointSelection>,
-            association: Box::new(Projective) as Box<dyn DataAssociation>,
-            filter: Box::new(filter()) as Box<dyn OutlierFilter>,
-            metric: Box::new(PointToPlane) as Box<dyn ErrorMetric>,
-            stop: Box::new(stop()) as Box<dyn StopRule>,
-        });
-        let (a, b) = (
-            run(&mut fixed, &model, &observation, &init),
-            run(&mut boxed, &model, &observation, &init),
-        );
-        assert_eq!(bits(&a.camera_from_object), bits(&b.camera_from_object));
-        assert_eq!(a, b);
-        refined += usize::from(a.verdict == Verdict::Refined);
-    }
-    assert!(refined >= 4, "{refined}");
-    // A box that did not forward `minimize` would use Gauss–Newton instead of the exact closed
-    // form.
-    let boxed: Box<dyn ErrorMetric> = Box::new(PointToPoint);
-    let pairs: Correspondences = model
-        .samples()
-        .iter()
-        .map(|s| hicp_core::Pair {
-            source: *s,
-            target: Surfel {
-                point: s.point + Vector3::x(),
-                ..*s
-            },
-            weight: 1.0,
-            source_index: 0,
-            target_index: 0,
-        })
-        .collect();
-    assert_eq!(
-        boxed.step(&pairs),
-        PointToPoint.minimize(&Iteration::default(), &pairs)
-    );
-    let names: Vec<_> = metrics().iter().map(|metric| metric.name()).collect();
-    assert_eq!(names, ["point-to-point", "point-to-plane"]);
-}
-
 /// Only a plane is visible: a plate before a wall moves onto it and does not slide along it.
 #[test]
 fn pitfall_12_a_plane_in_view_is_approached_without_sliding() {

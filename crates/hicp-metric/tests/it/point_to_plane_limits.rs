@@ -159,34 +159,6 @@ fn fewer_than_six_pairs_and_no_information_determine_nothing() {
 }
 
 #[test]
-fn weights_count_like_repeated_pairs() {
-    let mut numbers = Numbers(129);
-    for _ in 0..30 {
-        let off = small_motion(&mut numbers, 5.0, 0.01);
-        let pairs = ellipsoid(&mut numbers, 40, &off, &Vector3::new(0.2, 0.0, 0.5));
-        let (mut weighted, mut repeated) = (Correspondences::new(), Correspondences::new());
-        for (i, pair) in pairs.as_slice().iter().enumerate() {
-            weighted.push(Pair {
-                weight: (i % 3) as f32,
-                ..*pair
-            });
-            repeated.extend(std::iter::repeat_n(*pair, i % 3));
-        }
-        let (a, b) = (
-            PointToPlane
-                .minimize(&Iteration::default(), &weighted)
-                .unwrap(),
-            PointToPlane
-                .minimize(&Iteration::default(), &repeated)
-                .unwrap(),
-        );
-        let (angle, distance) = se3::pose_distance(&a.increment, &b.increment);
-        assert!(angle < 1e-13 && distance < 1e-13, "{angle} {distance}");
-        assert!((a.mean_loss - b.mean_loss).abs() < 1e-13 * a.mean_loss);
-    }
-}
-
-#[test]
 fn no_input_gives_nan() {
     let mut numbers = Numbers(130);
     let scales = [0.0, 1e-38, 1e-20, 1e-6, 1.0, 1e6, 1e18, 3e38];

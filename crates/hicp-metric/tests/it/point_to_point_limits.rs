@@ -3,7 +3,7 @@
 use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, pair, rms, rounding};
 use hicp_core::Iteration;
-use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, se3};
+use hicp_core::{Correspondences, Isometry3, Point3, Vector3, se3};
 use hicp_metric::Minimize;
 use hicp_metric::{PointToPoint, Step};
 
@@ -16,42 +16,6 @@ fn cloud(numbers: &mut Numbers, count: usize) -> Vec<Point3<f64>> {
 fn close(a: &Step, b: &Step) -> bool {
     let (angle, distance) = se3::pose_distance(&a.increment, &b.increment);
     angle < 1e-12 && distance < 1e-12 && (a.mean_loss - b.mean_loss).abs() <= 1e-12 * a.mean_loss
-}
-
-#[test]
-fn weights_count_like_repeated_pairs() {
-    let mut numbers = Numbers(111);
-    for _ in 0..50 {
-        let points = cloud(&mut numbers, 20);
-        let mut pairs = images(&points, &numbers.pose(0.2));
-        for pair in pairs.as_mut_slice() {
-            pair.target.point += (numbers.vector() * 0.01).cast::<f32>();
-        }
-        let (mut weighted, mut repeated) = (Correspondences::new(), Correspondences::new());
-        for (i, pair) in pairs.as_slice().iter().enumerate() {
-            let copies = i % 3;
-            weighted.push(Pair {
-                weight: copies as f32,
-                ..*pair
-            });
-            repeated.extend(std::iter::repeat_n(*pair, copies));
-        }
-        let (a, b) = (
-            PointToPoint.minimize(&Iteration::default(), &weighted),
-            PointToPoint.minimize(&Iteration::default(), &repeated),
-        );
-        assert!(close(&a.unwrap(), &b.unwrap()));
-        // Only ratios of weights matter.
-        for pair in weighted.as_mut_slice() {
-            pair.weight *= 0.125;
-        }
-        assert!(close(
-            &PointToPoint
-                .minimize(&Iteration::default(), &weighted)
-                .unwrap(),
-            &b.unwrap()
-        ));
-    }
 }
 
 #[test]

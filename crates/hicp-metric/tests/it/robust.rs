@@ -7,8 +7,7 @@ use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3};
 use hicp_metric::Minimize;
 use hicp_metric::{
-    ErrorMetric, Generalized, Kernel, PointToPlane, PointToPoint, Robust, RobustKernel, Scale,
-    Symmetric,
+    ErrorMetric, Kernel, PointToPlane, PointToPoint, Robust, RobustKernel, Scale, Symmetric,
 };
 
 const KERNELS: [Kernel; 7] = [
@@ -353,34 +352,6 @@ fn residuals_may_be_zero_equal_single_or_infinite() {
             }
         }
     }
-}
-
-#[test]
-fn scratch_and_boxes_do_not_change_results() {
-    let mut numbers = Numbers(47);
-    let (pairs, others) = (messy(&mut numbers, 60), messy(&mut numbers, 90));
-    let fresh = Robust::new(Generalized::default(), Kernel::WELSCH, Scale::default());
-    let mut used = fresh.clone();
-    let _ = used.minimize(&Iteration::default(), &others);
-    let mut boxed: Box<dyn Minimize> = Box::new(used.clone());
-    let expected = fresh.clone().minimize(&Iteration::default(), &pairs);
-    assert!(expected.is_some());
-    assert_eq!(used.minimize(&Iteration::default(), &pairs), expected);
-    assert_eq!(boxed.minimize(&Iteration::default(), &pairs), expected);
-    assert_eq!(
-        boxed.mean_loss(&Iteration::default(), &pairs),
-        Some(expected.unwrap().mean_loss)
-    );
-    assert_eq!(
-        boxed.system(&Iteration::default(), &pairs),
-        fresh.clone().system(&Iteration::default(), &pairs)
-    );
-    let mut inside: Robust<Box<dyn Minimize>> = Robust::new(
-        Box::new(Generalized::default()),
-        Kernel::WELSCH,
-        Scale::default(),
-    );
-    assert_eq!(inside.minimize(&Iteration::default(), &pairs), expected);
 }
 
 /// Student's t with ν degrees of freedom, which is not a built-in kernel.

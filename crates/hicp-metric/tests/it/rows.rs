@@ -300,39 +300,6 @@ fn inputs_that_are_not_finite_have_no_loss() {
 }
 
 #[test]
-fn equal_inputs_give_equal_bits_boxed_or_not() {
-    fn check<M: Minimize + Clone + 'static>(metric: &M) {
-        let mut numbers = Numbers(17);
-        let (pairs, others) = (messy(&mut numbers, 60), messy(&mut numbers, 30));
-        let mut used = metric.clone();
-        let fresh = metric.clone().minimize(&Iteration::default(), &pairs);
-        let _ = used.minimize(&Iteration::default(), &others);
-        assert_eq!(used.minimize(&Iteration::default(), &pairs), fresh);
-        let mut boxed: Box<dyn Minimize> = Box::new(metric.clone());
-        assert_eq!(boxed.minimize(&Iteration::default(), &pairs), fresh);
-        assert_eq!(
-            boxed.mean_loss(&Iteration::default(), &pairs),
-            used.mean_loss(&Iteration::default(), &pairs)
-        );
-        assert_eq!(
-            boxed.system(&Iteration::default(), &pairs),
-            used.system(&Iteration::default(), &pairs)
-        );
-        assert_eq!(boxed.label(), used.label());
-        let (mut a, mut b) = (vec![0.0; pairs.len()], vec![0.0; pairs.len()]);
-        boxed.add_squared_errors(&Iteration::default(), &pairs, 1.0, &mut a);
-        used.add_squared_errors(&Iteration::default(), &pairs, 1.0, &mut b);
-        assert_eq!(a, b);
-    }
-    check(&PlaneToPoint);
-    check(&Symmetric);
-    check(&Generalized::default());
-    check(&WeightedSum {
-        terms: ((1.0, PointToPlane), (0.1, PointToPoint)),
-    });
-}
-
-#[test]
 fn a_sum_is_the_sum_of_its_systems() {
     let mut numbers = Numbers(18);
     let pairs = messy(&mut numbers, 60);

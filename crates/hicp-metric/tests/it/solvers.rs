@@ -208,28 +208,3 @@ fn perfect_few_and_missing_pairs() {
         );
     }
 }
-
-#[test]
-fn scratch_and_boxes_do_not_change_results() {
-    fn check<M: Minimize + Clone + 'static>(fresh: &M) {
-        let mut numbers = Numbers(78);
-        let (pairs, others) = (messy(&mut numbers, 60), messy(&mut numbers, 90));
-        let mut used = fresh.clone();
-        let _ = used.minimize(&Iteration::default(), &others);
-        let mut boxed: Box<dyn Minimize> = Box::new(used.clone());
-        let expected = fresh.clone().minimize(&Iteration::default(), &pairs);
-        assert!(expected.is_some());
-        assert_eq!(used.minimize(&Iteration::default(), &pairs), expected);
-        assert_eq!(boxed.minimize(&Iteration::default(), &pairs), expected);
-        assert_eq!(
-            boxed.mean_loss(&Iteration::default(), &pairs),
-            fresh.clone().mean_loss(&Iteration::default(), &pairs)
-        );
-        assert_eq!(
-            boxed.system(&Iteration::default(), &pairs),
-            fresh.clone().system(&Iteration::default(), &pairs)
-        );
-    }
-    check(&GaussNewton::new(Symmetric));
-    check(&LevenbergMarquardt::new(Robust::<Generalized>::default()));
-}

@@ -24,8 +24,8 @@ use hybrid_icp::icp::{
 };
 use hybrid_icp::metric::{
     Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
-    LevenbergMarquardt, MetricSchedule, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Prior,
-    Robust, Scale, Symmetric, WeightedSum,
+    LevenbergMarquardt, MetricSchedule, Minimize, PlaneToPoint, PointToPlane, PointToPoint,
+    PosePrior, Prior, Robust, Scale, Symmetric, WeightedSum,
 };
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, SampledMve, Vsd};
@@ -44,6 +44,8 @@ fn built_in_selections_keep_the_laws() {
     check_selection(NormalSpace::default);
     check_selection(StableSampling::default);
     check_selection(|| StableSampling::new(VisibleSurface::default(), 100));
+    let normals = || NormalSpace::new(WithoutBoundary::default(), 80, 2);
+    check_selection(|| StableSampling::new(normals(), 20));
 }
 
 #[test]
@@ -56,6 +58,7 @@ fn built_in_associations_keep_the_laws() {
     check_association(NormalCompatible::default, strict);
     check_association(NormalShooting::default, strict);
     check_association(|| Reciprocal::new(NearestNeighbor::default()), strict);
+    check_association(|| Reciprocal::new(Projective), strict);
     check_association(|| Projective, strict);
     check_association(ProjectiveSearch::default, strict);
     let interpolating = AssociationLaws {
@@ -167,13 +170,13 @@ fn robust_metrics_keep_the_laws() {
         let scale = Scale::Mad { floor_meters: 0.0 };
         check_minimize(|| Robust::new(PointToPoint, kernel, scale), median);
     }
-    check_minimize(
-        Robust::<PointToPoint>::default,
-        MetricLaws {
-            units: false,
-            ..median
-        },
-    );
+    let known_median = MetricLaws {
+        units: false,
+        ..median
+    };
+    check_minimize(Robust::<PointToPoint>::default, known_median);
+    let generalized = || Robust::new(Generalized::default(), Kernel::WELSCH, Scale::default());
+    check_minimize(generalized, known_median);
 }
 
 #[test]
@@ -195,6 +198,13 @@ fn decorated_metrics_keep_the_laws() {
     // `Symmetric` is not tested here. λ scales the diagonal of JᵀWJ, which depends on the axes. Far
     // from the minimum, the iteration limit ends the steps early, so they differ between frames.
     check_minimize(LevenbergMarquardt::<PointToPlane>::default, all);
+    let nested = MetricLaws {
+        frame: false,
+        units: false,
+        multiplicity: false,
+        ..all
+    };
+    check_minimize(LevenbergMarquardt::<Robust<Generalized>>::default, nested);
     let frozen = |frame| Frozen {
         metric: PointToPlane,
         frame,
@@ -228,7 +238,17 @@ fn decorators_without_effect_forward_every_method() {
     check_metric_forwards(|| PointToPoint, Frozen::<PointToPoint>::default);
     check_metric_forwards(|| Symmetric, PosePrior::<Symmetric>::default);
     check_metric_forwards(|| Symmetric, || MetricSchedule::new(vec![Symmetric]));
+    // A box that does not forward `minimize` uses Gauss–Newton instead of the closed form.
+    check_metric_forwards(
+        || PointToPoint,
+        || Box::new(PointToPoint) as Box<dyn ErrorMetric>,
+    );
     check_metric_forwards(|| Symmetric, || Box::new(Symmetric) as Box<dyn ErrorMetric>);
+    let boxed = || Box::new(Generalized::default()) as Box<dyn Minimize>;
+    check_metric_forwards(
+        || Robust::new(Generalized::default(), Kernel::WELSCH, Scale::default()),
+        || Robust::new(boxed(), Kernel::WELSCH, Scale::default()),
+    );
 }
 
 #[test]

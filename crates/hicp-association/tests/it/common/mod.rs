@@ -290,17 +290,6 @@ pub fn blind_scene() -> Scene {
     scene
 }
 
-/// Poses at which no useful result exists.
-pub fn hostile_poses() -> Vec<Isometry3<f64>> {
-    vec![
-        Isometry3::translation(f64::NAN, 0.0, 0.5),
-        Isometry3::translation(0.0, f64::INFINITY, 0.5),
-        Isometry3::translation(0.0, 0.0, 1.0e300),
-        Isometry3::translation(0.0, 0.0, -0.5),
-        Isometry3::identity(),
-    ]
-}
-
 /// A selection of given points.
 #[derive(Clone)]
 pub struct Fixed(pub Vec<Surfel>);
