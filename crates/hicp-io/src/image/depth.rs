@@ -224,7 +224,6 @@ fn check_scale(path: &Path, value: f64) -> Result<(), IoError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Place;
     use proptest::prelude::*;
 
     proptest! {
@@ -245,23 +244,6 @@ mod tests {
             prop_assert_eq!(&again, &depth);
             for (meters, unit) in depth.pixels().iter().zip(&units) {
                 prop_assert!((f64::from(*meters) * 1000.0 - f64::from(*unit) * scale).abs() < 0.05);
-            }
-        }
-    }
-
-    #[test]
-    fn errors_name_other_pixel_types() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.png");
-        for (kind, bytes, name) in [
-            ((ColorType::Grayscale, BitDepth::Eight), 1, "8-bit gray"),
-            ((ColorType::Rgb, BitDepth::Sixteen), 6, "16-bit RGB"),
-            ((ColorType::Rgba, BitDepth::Eight), 4, "8-bit RGBA"),
-        ] {
-            pixels::write(&path, (1, 1), kind, &vec![1; bytes]).unwrap();
-            match read_depth_png(&path, 1.0) {
-                Err(IoError { found, .. }) => assert_eq!(found, format!("{name} pixels")),
-                other => panic!("{other:?}"),
             }
         }
     }
@@ -288,70 +270,5 @@ mod tests {
         assert!(!path.exists());
         write_depth_png(&path, &depth, 10.0).unwrap();
         assert_eq!(read_depth_png(&path, 10.0).unwrap(), depth);
-    }
-
-    #[test]
-    fn truncated_files_and_other_formats_are_refused() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.png");
-        let meters: Vec<f32> = (0..4096_u16).map(|i| f32::from(i % 251) * 0.01).collect();
-        let depth = DepthImage::from_meters(64, 64, meters).unwrap();
-        write_depth_png(&path, &depth, 1.0).unwrap();
-        let whole = std::fs::read(&path).unwrap();
-        for length in [0, 7, 20, 40, whole.len() / 2] {
-            std::fs::write(&path, &whole[..length]).unwrap();
-            assert!(
-                matches!(read_depth_png(&path, 1.0), Err(IoError { expected, .. }) if expected == "a PNG image"),
-                "{length}"
-            );
-        }
-        std::fs::write(&path, "P5 64 64 65535").unwrap();
-        assert!(matches!(
-            read_depth_png(&path, 1.0),
-            Err(IoError { expected, .. }) if expected == "a PNG image"
-        ));
-    }
-
-    #[test]
-    fn headers_of_decompression_bombs_are_refused() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.png");
-        let depth = DepthImage::from_meters(1, 1, vec![1.0]).unwrap();
-        write_depth_png(&path, &depth, 1.0).unwrap();
-        let small = std::fs::read(&path).unwrap();
-        let announce = |width: u32, height: u32| {
-            let mut content = small.clone();
-            content[16..20].copy_from_slice(&width.to_be_bytes());
-            content[20..24].copy_from_slice(&height.to_be_bytes());
-            let checksum = crc32(&content[12..29]);
-            content[29..33].copy_from_slice(&checksum.to_be_bytes());
-            std::fs::write(&path, content).unwrap();
-            read_depth_png(&path, 1.0)
-        };
-        for (width, height) in [(40_000, 1), (20_000, 20_000), (0x7fff_ffff, 0x7fff_ffff)] {
-            assert!(matches!(
-                announce(width, height),
-                Err(IoError { place: Some(Place::Byte(16)), found, .. })
-                if found == format!("{width}x{height} pixels")
-            ));
-        }
-        assert!(
-            matches!(announce(4096, 8192), Err(IoError { found, .. }) if found.contains("promises"))
-        );
-        assert!(
-            matches!(announce(2, 2), Err(IoError { expected, .. }) if expected == "a PNG image")
-        );
-    }
-
-    fn crc32(bytes: &[u8]) -> u32 {
-        !bytes.iter().fold(u32::MAX, |crc, byte| {
-            (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
-                if crc & 1 == 1 {
-                    (crc >> 1) ^ 0xedb8_8320
-                } else {
-                    crc >> 1
-                }
-            })
-        })
     }
 }

@@ -220,23 +220,6 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_line_of_an_invalid_position() {
-        for record in ["v 1 2 1e30", "v nan 0 0", "v 0 -inf 0"] {
-            let text = format!("v 0 0 0\n{record}\nv 0 1 0\nf 1 2 3\n");
-            assert!(
-                matches!(
-                    read(&text),
-                    Err(IoError {
-                        place: Some(Place::Line(2)),
-                        ..
-                    })
-                ),
-                "{record}"
-            );
-        }
-    }
-
-    #[test]
     fn a_continued_line_at_the_end_of_the_file_is_read() {
         let mesh = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1 \\").unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 0]]);

@@ -347,22 +347,6 @@ mod tests {
     }
 
     #[test]
-    fn an_error_names_the_place_of_a_count_of_0() {
-        match read(&binary(b"x", 0, 0)).unwrap().finish() {
-            Err(IoError {
-                found,
-                expected,
-                place: Some(Place::Byte(80)),
-                ..
-            }) => {
-                assert_eq!(found, "a count of 0 triangles");
-                assert_eq!(expected, "a face of three corners or more");
-            }
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
     fn errors_quote_the_line_of_text_that_does_not_start_with_solid() {
         let html = format!("<html>{}", "x".repeat(200));
         let mesh = format!("{FACET}endsolid\n");
@@ -386,25 +370,6 @@ mod tests {
                     assert!(expected.starts_with("`solid`"), "{expected}");
                 }
                 other => panic!("{text:?}: {other:?}"),
-            }
-        }
-    }
-
-    #[test]
-    fn errors_name_the_byte_of_a_wrong_count_or_position() {
-        let mut far = binary(b"x", 2, 2);
-        far[84 + 50 + 12..84 + 50 + 16].copy_from_slice(&f32::NAN.to_le_bytes());
-        for (content, at) in [
-            (binary(b"x", 1, 2), 80),
-            (binary(b"x", 0, 1), 80),
-            (far, 146),
-        ] {
-            match read(&content) {
-                Err(IoError {
-                    place: Some(Place::Byte(offset)),
-                    ..
-                }) => assert_eq!(offset, at),
-                other => panic!("{other:?}"),
             }
         }
     }

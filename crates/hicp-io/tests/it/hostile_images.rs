@@ -174,8 +174,8 @@ fn errors_name_every_other_pixel_type() {
 #[test]
 fn decompression_bombs_are_refused_by_their_headers() {
     let folder = tempfile::tempdir().unwrap();
-    // Three cases: above the limit; within the limit, but more than the file can hold; and
-    // complete, but above a custom limit.
+    // Cases: above the limit; within the limit, but more than the file can hold. Below: complete,
+    // but above a custom limit.
     for (width, height, parts) in [
         (
             32_768,
@@ -188,6 +188,12 @@ fn decompression_bombs_are_refused_by_their_headers() {
             ][..],
         ),
         (100_000, 2, &["100000x2", "sides of 1 to"]),
+        // The product does not fit 32 bits.
+        (
+            0x7fff_ffff,
+            0x7fff_ffff,
+            &["byte 16", "2147483647x2147483647"],
+        ),
         (
             4096,
             8192,
@@ -263,6 +269,9 @@ fn data_that_do_not_fit_the_header_are_refused() {
             message(&error)
         );
     }
+    let other = write(folder.path(), "a.png", b"P5 64 64 65535");
+    let error = read_depth_png(other, 1.0).unwrap_err();
+    assert_eq!(error.expected, "a PNG image");
     // A file with any one damaged byte gives an image or an error.
     let depth = hicp_core::DepthImage::from_meters(5, 4, vec![0.5; 20]).unwrap();
     let path = folder.path().join("a.png");

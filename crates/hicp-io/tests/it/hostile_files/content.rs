@@ -15,6 +15,13 @@ fn headers_that_announce_terabytes_are_refused() {
             );
         }
     }
+    for element in [
+        "vertex 18446744073709551615\nproperty float x",
+        "empty 1000000000000",
+    ] {
+        let text = format!("ply\nformat ascii 1.0\nelement {element}\nend_header\n1 2 3\n");
+        refused("a.ply", text, &["line 3", "promises"]);
+    }
     let counts = ply("ascii", "18446744073709551616", "1", "uchar int");
     refused("a.ply", counts, &["line 3"]);
     refused("a.ply", ply("ascii", "-3", "1", "uchar int"), &["line 3"]);
@@ -28,8 +35,9 @@ fn headers_that_announce_terabytes_are_refused() {
         stl("made", u32::MAX, 1),
         &["byte 80", "4294967295 triangles"],
     );
-    // A list that announces more corners than there are bytes.
+    // A list that announces more corners than there are bytes, or fewer than none.
     for (count, bytes) in [
+        ("int", (-1_i32).to_le_bytes()),
         ("int", 2_000_000_000_i32.to_le_bytes()),
         ("uint", [0xff; 4]),
     ] {
@@ -65,7 +73,12 @@ fn indices_out_of_range_are_refused() {
     }
     for index in ["4", "-1", "4294967296"] {
         let text = ply("ascii", "3", "2", "uchar int") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-        refused("a.ply", format!("{text}3 0 1 {index}\n"), &["line 14"]);
+        let named = format!("vertex {index} in face 1");
+        refused(
+            "a.ply",
+            format!("{text}3 0 1 {index}\n"),
+            &["line 14", &named],
+        );
         refused(
             "a.off",
             format!("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 {index}\n"),
@@ -85,11 +98,14 @@ fn invalid_coordinates_are_refused() {
         "1e30",
         "-20000000",
     ] {
-        refused(
-            "a.obj",
-            format!("{SQUARE}v 0 0 {value}\nf 1 2 5\n"),
-            &["line 5", "finite", "m"],
-        );
+        for position in [
+            format!("{value} 0 0"),
+            format!("0 {value} 0"),
+            format!("0 0 {value}"),
+        ] {
+            let text = format!("{SQUARE}v {position}\nf 1 2 5\n");
+            refused("a.obj", text, &["line 5", "finite", "m"]);
+        }
         refused(
             "a.off",
             format!("OFF\n3 1 0\n0 0 0\n1 {value} 0\n0 1 0\n3 0 1 2\n"),
@@ -105,8 +121,9 @@ fn invalid_coordinates_are_refused() {
         refused("a.stl", facet, &["line 4", "finite"]);
     }
     let mut binary = stl("", 2, 2);
-    binary[84 + 12..84 + 16].copy_from_slice(&f32::INFINITY.to_le_bytes());
-    refused("a.stl", binary, &["byte 96", "finite"]);
+    let second = 84 + 50 + 12;
+    binary[second..second + 4].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    refused("a.stl", binary, &["byte 146", "finite"]);
     // The coordinates of a map are accepted, and so are denormal numbers.
     let far = "v 500000 4582345.26 0\nv 500010 4582345 0\nv 500000 4582355 0\nf 1 2 3\n";
     assert_eq!(triangles("a.obj", far), 1);
@@ -147,6 +164,7 @@ fn truncated_files_are_refused() {
         stl("", 2, 3),
         &["byte 80", "2 triangles", "3, which"],
     );
+    refused("a.stl", stl("", 0, 1), &["byte 80"]);
     let whole = ply("ascii", "3", "1", "uchar int") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2";
     assert_eq!(triangles("a.ply", &whole), 1);
     for end in 1..whole.len() {
