@@ -279,8 +279,17 @@ mod tests {
         }
         let error = Rle::from_counts(u32::MAX, u32::MAX, vec![]).unwrap_err();
         assert_eq!(error.expected, "at most 33554432");
-        let error = Rle::from_compressed(3, 2, "1 2").unwrap_err();
-        assert_eq!(error.found, "character ' ' at byte 1");
+        // One run of 8 pixels.
+        let error = Rle::from_compressed(3, 2, "8").unwrap_err();
+        assert_eq!(error.expected, "6 for 3x2", "{error}");
+        for (text, found) in [
+            ("1 2", "character ' ' at byte 1"),
+            ("~", "character '~' at byte 0"),
+        ] {
+            let error = Rle::from_compressed(3, 2, text).unwrap_err();
+            assert_eq!(error.found, found);
+            assert!(error.expected.contains("'0' to 'o'"), "{error}");
+        }
         for text in ["1X", "N", "oooooooooooooooooooo", "ooooooo?"] {
             let error = Rle::from_compressed(3, 2, text).unwrap_err();
             assert!(error.found.starts_with("run "), "{text}: {error}");

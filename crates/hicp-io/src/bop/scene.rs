@@ -277,6 +277,25 @@ mod tests {
     }
 
     #[test]
+    fn errors_of_a_camera_name_the_field() {
+        let text = CAMERA.replacen("[600,0,1,0,600,1,0,0,1]", "400", 1);
+        for (text, part) in [
+            (
+                text,
+                "$.10.cam_K: found 400, expected an array of 9 numbers",
+            ),
+            (
+                CAMERA.replace("0.5", "\"mm\""),
+                "$.10.depth_scale: found the text \"mm\"",
+            ),
+        ] {
+            let (_dir, scene) = scene(&[("scene_camera.json", &text)]);
+            let error = scene.unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
     fn errors_name_damaged_tiff_depth_images_and_a_missing_depth_scale() {
         let (_dir, scene) = scene(&[
             ("scene_camera.json", CAMERA),

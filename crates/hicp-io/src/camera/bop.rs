@@ -286,6 +286,10 @@ mod tests {
         assert_eq!(key(&FLAT.replace("600", "-600")), "$");
         assert_eq!(key(&format!("{{{}}}", K.replace("600", "0"))), "$.cam_K");
         assert_eq!(key(&FLAT.replace("640", "64.5")), "$.width");
+        let skewed = read(&format!("{{{}}}", K.replace("600.0, 0", "600.0, 3")));
+        let error = skewed.unwrap_err();
+        let cause = std::error::Error::source(&error).unwrap().to_string();
+        assert!(cause.contains("[0][1] is 3, expected 0"), "{cause}");
         for text in [
             FLAT.replace("640", "320"),
             format!(r#"{{{K}, "width": 320, "height": 480}}"#),

@@ -219,13 +219,18 @@ mod tests {
             text.contains("$.cam_t_m2c: found null, expected an array of 3 numbers"),
             "{text}"
         );
-        let reflection = r#"{"cam_R_m2c":[1,0,0,0,1,0,0,0,-1],"cam_t_m2c":[0,0,0]}"#;
-        let text = read(reflection).unwrap_err().to_string();
-        assert!(
-            text.contains("$.cam_R_m2c: found numbers that are not a rotation"),
-            "{text}"
-        );
-        assert!(text.contains("determinant -1, expected 1"), "{text}");
+        for (rotation, parts) in [
+            ("[1,0,0,0,1,0,0,0,-1]", ["determinant -1", "expected 1"]),
+            ("[1,0,0,0,1,0,0,0,1.002]", ["not orthogonal", "0.00400"]),
+            ("[0,0,0,0,0,0,0,0,0]", ["not orthogonal", " is 1,"]),
+        ] {
+            let text = format!(r#"{{"cam_R_m2c":{rotation},"cam_t_m2c":[0,0,0]}}"#);
+            let text = read(&text).unwrap_err().to_string();
+            let field = "$.cam_R_m2c: found numbers that are not a rotation";
+            for part in [[field].as_slice(), &parts].concat() {
+                assert!(text.contains(part), "no {part:?} in: {text}");
+            }
+        }
         assert!(matches!(
             read("[1]"),
             Err(IoError {

@@ -44,8 +44,6 @@ fn missing_files() {
 
 #[test]
 fn cameras() {
-    let zero = FLAT_CAMERA.replace("400", "0");
-    refused_file("camera.json", zero, &["camera.json", "fx is 0", "above 0"]);
     let negative = FLAT_CAMERA.replace("402", "-402");
     refused_file(
         "camera.json",
@@ -57,29 +55,6 @@ fn cameras() {
         "camera.json",
         zero,
         &["camera.json", "cam_K", "fx is 0", "above 0"],
-    );
-    let skewed = BOP_CAMERA.replace("[400, 0", "[400, 3");
-    refused_file(
-        "camera.json",
-        skewed,
-        &["camera.json", "cam_K", "[0][1] is 3", "expected 0"],
-    );
-    refused_file(
-        "camera.json",
-        r#"{"cam_K": [1, 2]}"#,
-        &["camera.json", "cam_K", "array of 2", "9 numbers"],
-    );
-    refused_file(
-        "camera.json",
-        BOP_CAMERA.replace("400", "NaN"),
-        &["camera.json", "line 1", "not valid JSON"],
-    );
-    refused_file("camera.json", "{}", &["camera.json", "cam_K", "fx"]);
-    let zero = BOP_CAMERA.replace("0.1", "0");
-    refused_file(
-        "camera.json",
-        zero,
-        &["camera.json", "depth_scale", "found 0", "above 0"],
     );
     refused(
         Scene::new().without("--depth-scale"),
@@ -113,71 +88,32 @@ fn sizes_that_disagree_name_both_files_and_sizes() {
 
 #[test]
 fn images() {
-    for name in ["depth.png", "mask.png"] {
-        let scene = Scene::new();
-        let whole = std::fs::read(scene.path(name)).unwrap();
-        for length in [0, 20, whole.len() / 2] {
-            let scene = Scene::new();
-            scene.write(name, &whole[..length]);
-            refused(scene, &[name, "PNG"]);
-        }
-        refused_file(name, "XY 320 240", &[name, "PNG"]);
-    }
     let scene = Scene::new();
-    hicp_io::write_rgb_png(scene.path("depth.png"), 320, 240, &[9; 320 * 240 * 3]).unwrap();
-    refused(scene, &["depth.png", "8-bit RGB", "16-bit gray"]);
+    let whole = std::fs::read(scene.path("depth.png")).unwrap();
+    scene.write("depth.png", &whole[..whole.len() / 2]);
+    refused(scene, &["depth.png", "PNG"]);
     let scene = Scene::new();
     hicp_io::write_mask_png(scene.path("depth.png"), &Mask::full(320, 240)).unwrap();
     refused(scene, &["depth.png", "8-bit gray", "16-bit gray"]);
+    refused_file("mask.png", "XY 320 240", &["mask.png", "PNG"]);
 }
 
 #[test]
 fn initial_poses() {
-    let pose = |rotation: &str, translation: &str| {
-        format!(r#"{{"cam_R_m2c": {rotation}, "cam_t_m2c": {translation}}}"#)
-    };
-    let good = "[1,0,0,0,1,0,0,0,1]";
-    for (text, parts) in [
+    let pose = |rotation: &str| format!(r#"{{"cam_R_m2c": {rotation}, "cam_t_m2c": [0,0,500]}}"#);
+    for (rotation, parts) in [
         (
-            pose("[1,0,0,0,1,0,0,0,-1]", "[0,0,500]"),
-            &["cam_R_m2c", "determinant -1", "expected 1", "0.001"][..],
+            "[1,0,0,0,1,0,0,0,-1]",
+            ["determinant -1", "expected 1", "0.001"],
         ),
-        (
-            pose("[1,0,0,0,1,0,0,0,1.002]", "[0,0,500]"),
-            &["cam_R_m2c", "not orthogonal", "0.00400", "0.001"],
-        ),
-        (
-            pose("[0,0,0,0,0,0,0,0,0]", "[0,0,500]"),
-            &["cam_R_m2c", "not orthogonal", " 1,"],
-        ),
-        (
-            pose("[1,0,0,0,1,0,0,0]", "[0,0,500]"),
-            &["cam_R_m2c", "array of 8", "9 numbers"],
-        ),
-        (
-            pose("[1,0,0,0,1,0,0,0,\"1\"]", "[0,0,500]"),
-            &["cam_R_m2c[8]", "number"],
-        ),
-        (
-            pose(good, "[0,0]"),
-            &["cam_t_m2c", "array of 2", "3 numbers"],
-        ),
-        (
-            pose(good, "[0,0,null]"),
-            &["cam_t_m2c[2]", "null", "number"],
-        ),
-        (pose(good, "[0,0,Infinity]"), &["line 1", "not valid JSON"]),
-        (format!(r#"{{"cam_R_m2c": {good}}}"#), &["cam_t_m2c"]),
-        (String::new(), &["line 1", "not valid JSON"]),
+        ("[1,0,0,0,1,0,0,0]", ["array of 8", "expected", "9 numbers"]),
     ] {
-        refused_file("init.json", text, &[&["init.json"], parts].concat());
+        let parts = [&["init.json", "cam_R_m2c"], &parts[..]].concat();
+        refused_file("init.json", pose(rotation), &parts);
     }
     // A rotation that is rounded to four digits is accepted.
     let scene = Scene::new();
-    scene.write(
-        "init.json",
-        pose("[1,0,0,0,0.8661,-0.5,0,0.5,0.8660]", "[0,0,500]"),
-    );
+    scene.write("init.json", pose("[1,0,0,0,0.8661,-0.5,0,0.5,0.8660]"));
     scene.run().exits(0);
 }
 
@@ -189,17 +125,8 @@ fn meshes() {
     );
     refused_file("mesh.ply", "", &["mesh.ply"]);
     let scene = Scene::new().with("--model", "a.obj");
-    scene.write("a.obj", "v 0 0 0\nv 1 0 0\n");
-    refused(scene, &["a.obj", "line 2", "expected a face"]);
-    let scene = Scene::new().with("--model", "a.obj");
-    scene.write("a.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n");
-    refused(scene, &["a.obj", "finite"]);
-    let scene = Scene::new().with("--model", "a.obj");
     scene.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
-    refused(scene, &["a.obj", "4"]);
-    let scene = Scene::new().with("--model", "a.stl");
-    scene.write("a.stl", "solid x\nendsolid x\n");
-    refused(scene, &["a.stl"]);
+    refused(scene, &["a.obj, line 4", "\"f 1 2 4\"", "expected"]);
 }
 
 #[test]
