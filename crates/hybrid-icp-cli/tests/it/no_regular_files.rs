@@ -1,6 +1,7 @@
-//! Pipes without a writer, endless devices, and folders in the place of every input.
+//! Pipes without a writer, endless devices, and folders in the place of inputs.
 //!
-//! Each is reported, and the program never waits.
+//! Each is reported, and the program never waits. One function of `hicp-io` opens the files that
+//! commands read, so one command per kind of reader is enough.
 #![cfg(unix)]
 
 use std::path::Path;
@@ -106,48 +107,16 @@ fn every_input_of_refine() {
 }
 
 #[test]
-fn inspect_and_replay() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    for kind in STRANGERS {
-        for file in ["a.obj", "a.off", "a.ply", "a.stl", "trace.jsonl"] {
-            put(kind, &folder.join(file));
-            let command = if file.starts_with("trace") {
-                "replay"
-            } else {
-                "inspect"
-            };
-            ends(folder, &[command, file])
-                .exits(1)
-                .complains(&["error: ", file]);
-            take_away(&folder.join(file));
-        }
-    }
-}
-
-#[test]
-fn every_input_of_the_commands_over_datasets() {
+fn results_and_journal_of_a_dataset() {
     let world = World::new();
     let folder = world.folder.path();
     write_results(world.path("in.csv"), &world.rows()).unwrap();
-    std::fs::write(world.path("detections.json"), "[]").unwrap();
-    std::fs::write(world.path("targets.json"), "[]").unwrap();
     let refine = "bop refine --dataset . --results in.csv --output out.csv";
     each_is_reported(folder, refine, "in.csv");
-    let detections = format!("{refine} --detections detections.json");
-    each_is_reported(folder, &detections, "detections.json");
-    each_is_reported(
-        folder,
-        &format!("{refine} --targets targets.json"),
-        "targets.json",
-    );
-    each_is_reported(folder, "bop eval --dataset . --results in.csv", "in.csv");
-    let show = "bop show --dataset . --scene 3 --image 0 --results in.csv --out show.png";
-    each_is_reported(folder, show, "in.csv");
     std::fs::write(world.path("out.csv.journal"), "").unwrap();
     each_is_reported(folder, refine, "out.csv.journal");
     std::fs::remove_file(world.path("out.csv.journal")).unwrap();
-    assert!(!world.path("out.csv").exists() && !world.path("show.png").exists());
+    assert!(!world.path("out.csv").exists());
 }
 
 /// In a dataset's folders, an entry that is not a file counts as missing: its rows are kept.
@@ -186,99 +155,4 @@ fn every_file_of_a_dataset() {
         }
         std::fs::rename(&aside, &path).unwrap();
     }
-}
-
-#[test]
-fn meshes_and_pipelines_of_an_experiment() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    std::fs::create_dir(folder.join("meshes")).unwrap();
-    for kind in STRANGERS {
-        put(kind, &folder.join("meshes/a.ply"));
-        let words = [
-            "experiment",
-            "init-noise",
-            "--objects",
-            "meshes",
-            "--out",
-            "out",
-            "--poses",
-            "1",
-        ];
-        let told = ends(folder, &words);
-        assert!(
-            told.code == 1 && told.err.starts_with("error: "),
-            "{kind}: {}",
-            told.err
-        );
-        take_away(&folder.join("meshes/a.ply"));
-        put(kind, &folder.join("a.toml"));
-        let words = [
-            "experiment",
-            "init-noise",
-            "--household",
-            "tuning",
-            "--out",
-            "out",
-            "--poses",
-            "1",
-            "--variants",
-            "a.toml",
-        ];
-        let told = ends(folder, &words);
-        assert!(
-            told.code == 1 && told.err.contains("a.toml"),
-            "{kind}: {}",
-            told.err
-        );
-        take_away(&folder.join("a.toml"));
-    }
-    assert_eq!(names(folder), ["meshes"]);
-}
-
-#[test]
-fn files_of_studies() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let words =
-        "experiment init-noise --household tuning --poses 1 --variants hybrid --resume --out a";
-    std::fs::create_dir(folder.join("a")).unwrap();
-    std::fs::write(folder.join("a/config.json"), "{}").unwrap();
-    std::fs::write(folder.join("a/cases.csv"), "object").unwrap();
-    each_is_reported(folder, words, "a/config.json");
-    each_is_reported(folder, "experiment report --out r a", "a/config.json");
-    let config = hicp_experiments::Config::new(
-        hicp_experiments::Experiment::InitNoise,
-        &hicp_experiments::Subject::household(&hicp_sim::Household::TUNING).unwrap(),
-        &[hicp_experiments::Variant::preset(
-            hybrid_icp::Preset::Hybrid,
-        )],
-        1,
-        1,
-    )
-    .unwrap();
-    let text = serde_json::to_string_pretty(&config).unwrap() + "\n";
-    std::fs::write(folder.join("a/config.json"), text).unwrap();
-    each_is_reported(folder, words, "a/cases.csv");
-    each_is_reported(folder, "experiment report --out r a", "a/cases.csv");
-
-    let words = "experiment sequential --resume --out s";
-    std::fs::create_dir(folder.join("s")).unwrap();
-    std::fs::write(folder.join("s/config.json"), "{}").unwrap();
-    std::fs::write(folder.join("s/trajectories.csv"), "object").unwrap();
-    each_is_reported(folder, words, "s/config.json");
-    let config = hicp_experiments::TrajectoryConfig::new(
-        &hicp_experiments::Subject::household(&hicp_sim::Household::TEST).unwrap(),
-        &[
-            hybrid_icp::Preset::Hybrid,
-            hybrid_icp::Preset::ProjectiveCascadePointPlane,
-        ],
-        1,
-        1,
-    )
-    .unwrap();
-    let text = serde_json::to_string_pretty(&config).unwrap() + "\n";
-    std::fs::write(folder.join("s/config.json"), text).unwrap();
-    each_is_reported(folder, words, "s/trajectories.csv");
-    assert!(!folder.join("r").exists());
 }
