@@ -5,8 +5,7 @@ mod results;
 
 use crate::common::*;
 use hicp_io::LengthUnit;
-use hybrid_icp::core::{DepthImage, Isometry3, Mask, Point3, TriMesh, Vector3};
-use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, TriMesh};
 use serde_json::Value;
 
 /// Writes a mesh as binary STL.
@@ -144,88 +143,19 @@ fn a_pose_that_cannot_be_refined_keeps_the_numbers_of_the_file() {
 }
 
 #[test]
-fn objects_out_of_view_and_odd_meshes_have_an_outcome() {
-    let honest = |scene: &Scene| {
-        let result = scene.result();
-        let outcome = result["outcome"].as_str().unwrap();
-        assert!(["refined", "kept_initial"].contains(&outcome));
-        assert!(result["mve"].is_f64() && result["mve_initial"].is_f64());
-        let _ = pose_of(&result);
-        // A pose that is worse than the initial one, or bad, gives a warning.
-        let (mve, init) = (result["mve"].as_f64(), result["mve_initial"].as_f64());
-        let err = scene.run().err;
-        assert_eq!(err.contains("worse than the initial"), mve > init);
-        assert_eq!(err.contains("do not trust it"), mve >= Some(0.4));
-        result
-    };
-    for (x, z) in [
-        (0.0, -0.5),
-        (0.0, 0.0),
-        (5.0, 0.5),
-        (0.0, 1e-9),
-        (1e12, 1e12),
-    ] {
-        let scene = Scene::new().with("--overlay", "overlay.png");
-        let pose = Isometry3::translation(x, 0.0, z);
-        scene.write("init.json", pose_json(&pose).to_string());
-        honest(&scene);
-    }
-
-    // Half of the object is outside the image.
+fn warnings_follow_the_mve_of_an_object_out_of_view() {
     let scene = Scene::new().with("--overlay", "overlay.png");
-    let mut pose = truth();
-    pose.translation.vector += Vector3::new(-0.22, 0.0, 0.0);
-    let depth = render_depth_image(&car(), &camera(), &pose);
-    let pixels = depth.pixels().iter().filter(|z| **z > 0.0).count();
-    let at_the_edge = (0..240).filter(|v| depth.get(0, *v).unwrap() > 0.0).count();
-    assert!(pixels > 500 && at_the_edge > 20, "{pixels} {at_the_edge}");
-    hicp_io::write_depth_png(scene.path("depth.png"), &depth, 0.1).unwrap();
-    hicp_io::write_mask_png(scene.path("mask.png"), &Mask::measured(&depth)).unwrap();
-    scene.write("init.json", pose_json(&off(&pose, 2)).to_string());
-    let result = honest(&scene);
-    assert!(result["n_pairs"].as_u64().unwrap() > 100, "{result}");
-
-    let scene = Scene::new();
-    let corners = vec![
-        Point3::origin(),
-        Point3::new(0.1, 0.0, 0.0),
-        Point3::new(0.0, 0.1, 0.0),
-    ];
-    let triangle = TriMesh::new(corners, vec![[0, 1, 2]]).unwrap();
-    hicp_io::write_ply(scene.path("mesh.ply"), &triangle, LengthUnit::Meters).unwrap();
-    honest(&scene);
-}
-
-#[test]
-fn three_hundred_thousand_triangles_are_refined() {
-    let scene = Scene::new();
-    // The mesh is a bent sheet without symmetry.
-    let side = 388_u32;
-    let at = |i: u32, j: u32| {
-        let (x, y) = (f64::from(i) / 388.0 - 0.5, f64::from(j) / 388.0 - 0.5);
-        let z = 0.03 * (7.0 * x).sin() * (5.0 * y + 1.0).cos() + 0.02 * x * y;
-        Point3::new(0.2 * x, 0.15 * y, z).cast::<f32>()
-    };
-    let vertices = (0..=side)
-        .flat_map(|j| (0..=side).map(move |i| at(i, j)))
-        .collect();
-    let cell = |i: u32, j: u32| {
-        let a = j * (side + 1) + i;
-        let b = a + side + 1;
-        [[a, a + 1, b + 1], [a, b + 1, b]]
-    };
-    let triangles: Vec<_> = (0..side)
-        .flat_map(|j| (0..side).flat_map(move |i| cell(i, j)))
-        .collect();
-    assert!(triangles.len() > 300_000);
-    let mesh = TriMesh::new(vertices, triangles).unwrap();
-    let pose = Isometry3::new(Vector3::new(0.0, 0.0, 0.4), Vector3::new(2.6, 0.3, 0.2));
-    let depth = render_depth_image(&mesh, &camera(), &pose);
-    hicp_io::write_ply(scene.path("mesh.ply"), &mesh, LengthUnit::Meters).unwrap();
-    hicp_io::write_depth_png(scene.path("depth.png"), &depth, 0.1).unwrap();
-    hicp_io::write_mask_png(scene.path("mask.png"), &Mask::measured(&depth)).unwrap();
-    scene.write("init.json", pose_json(&off(&pose, 3)).to_string());
-    assert_improved(&pose_of(&scene.result()), &pose);
+    let aside = Isometry3::translation(5.0, 0.0, 0.5);
+    scene.write("init.json", pose_json(&aside).to_string());
+    let result = scene.result();
+    let outcome = result["outcome"].as_str().unwrap();
+    assert!(["refined", "kept_initial"].contains(&outcome));
+    let _ = pose_of(&result);
+    // A pose that is worse than the initial one, or bad, gives a warning.
+    let [mve, init] = ["mve", "mve_initial"].map(|key| result[key].as_f64().unwrap());
+    let err = scene.run().err;
+    assert_eq!(err.contains("worse than the initial"), mve > init);
+    assert_eq!(err.contains("do not trust it"), mve >= 0.4);
 }
 
 #[test]
