@@ -57,7 +57,7 @@ mod mesh;
 pub use mesh::{MeshFile, read_mesh, write_obj, write_ply};
 
 mod cloud;
-pub use cloud::{PointCloud, read_cloud, read_point_cloud_ply, write_point_cloud_ply};
+pub use cloud::{PointCloud, read_cloud, write_point_cloud_ply};
 
 mod image;
 pub use image::{

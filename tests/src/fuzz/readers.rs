@@ -9,8 +9,8 @@ use hicp_io::bop::{
 };
 use hicp_io::{
     IoError, LengthUnit, MaskFile, MaskRule, read_camera, read_camera_json, read_cloud, read_color,
-    read_depth, read_depth_png, read_mask, read_mask_png, read_mesh, read_point_cloud_ply,
-    read_pose, read_pose_json, write_mask_png, write_ply, write_pose_json,
+    read_depth, read_depth_png, read_mask, read_mask_png, read_mesh, read_pose, read_pose_json,
+    write_mask_png, write_ply, write_pose_json,
 };
 use hybrid_icp::core::{TriMesh, se3};
 use hybrid_icp::pipeline::PipelineFile;
@@ -92,7 +92,7 @@ pub(super) fn stl(data: &[u8]) {
 pub(super) fn ply(data: &[u8]) {
     mesh("a.ply", data);
     let path = with_bytes("cloud.ply", data);
-    let _ = checked(&path, read_point_cloud_ply(&path, LengthUnit::Meters));
+    let _ = checked(&path, read_cloud(&path, LengthUnit::Meters));
 }
 
 /// Reads the bytes as a depth image, a mask and a color image.

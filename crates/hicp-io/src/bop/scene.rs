@@ -184,14 +184,6 @@ impl Scene {
             .join(format!("mask_visib/{im_id:06}_{instance:06}.png"))
     }
 
-    /// Returns the path of the mask of an instance's whole silhouette. The file may not exist.
-    ///
-    /// `instance` counts from 0 in the order of the ground truth.
-    #[must_use]
-    pub fn full_mask_path(&self, im_id: u32, instance: usize) -> PathBuf {
-        self.dir.join(format!("mask/{im_id:06}_{instance:06}.png"))
-    }
-
     /// Reads the mask of the visible part of an instance.
     ///
     /// # Errors

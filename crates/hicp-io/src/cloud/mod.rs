@@ -7,6 +7,6 @@ mod points;
 mod read;
 mod table;
 
-pub use ply::{read_point_cloud_ply, write_point_cloud_ply};
+pub use ply::write_point_cloud_ply;
 pub use points::PointCloud;
 pub use read::read_cloud;

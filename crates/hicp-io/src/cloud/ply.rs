@@ -6,36 +6,11 @@ use hicp_core::{Point3, UnitVector3, Vector3};
 
 use super::points::PointCloud;
 use crate::error::IoError;
-use crate::limits::ReadLimits;
 use crate::mesh::ply;
 use crate::mesh::raw::Reading;
 use crate::unit::LengthUnit;
 
-/// Reads the vertices of an ASCII or binary PLY file as a point cloud.
-///
-/// Faces and other elements are skipped. Normals are read if the vertices have `nx`, `ny` and `nz`,
-/// and are normalized. The limits are those of [`ReadLimits::DEFAULT`].
-///
-/// # Errors
-///
-/// As for [`crate::read_mesh`], for malformed files and invalid positions. Also if a normal has no
-/// direction.
-pub fn read_point_cloud_ply(
-    path: impl AsRef<Path>,
-    unit: LengthUnit,
-) -> Result<PointCloud, IoError> {
-    let path = path.as_ref();
-    let limits = &ReadLimits::DEFAULT;
-    let reading = Reading {
-        path,
-        unit,
-        limits,
-        with_color: false,
-    };
-    parse(reading, &limits.read_bytes(path)?)
-}
-
-/// Parses the vertices of a PLY file.
+/// Parses the vertices of an ASCII or binary PLY file. Faces and other elements are skipped.
 pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, IoError> {
     let (path, unit) = (reading.path, reading.unit);
     let raw = ply::parse_points(reading, content)?;
@@ -94,6 +69,7 @@ pub fn write_point_cloud_ply(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::read_cloud;
 
     #[test]
     fn clouds_survive_writing_and_reading() {
@@ -106,7 +82,7 @@ mod tests {
         ];
         for normals in [None, Some(&normals[..])] {
             write_point_cloud_ply(&path, &points, normals).unwrap();
-            let cloud = read_point_cloud_ply(&path, LengthUnit::Meters).unwrap();
+            let cloud = read_cloud(&path, LengthUnit::Meters).unwrap();
             assert_eq!(cloud.points, points);
             match (cloud.normals, normals) {
                 (None, None) => {}
@@ -120,7 +96,7 @@ mod tests {
         }
         write_point_cloud_ply(&path, &[], None).unwrap();
         assert!(
-            read_point_cloud_ply(&path, LengthUnit::Meters)
+            read_cloud(&path, LengthUnit::Meters)
                 .unwrap()
                 .points
                 .is_empty()
@@ -150,7 +126,7 @@ mod tests {
                 "ply\nformat ascii 1.0\nelement vertex 1\n{properties}end_header\n{body}\n"
             );
             std::fs::write(&path, text).unwrap();
-            let error = read_point_cloud_ply(&path, LengthUnit::Meters).unwrap_err();
+            let error = read_cloud(&path, LengthUnit::Meters).unwrap_err();
             let expected = ["finite coordinates", "finite numbers", "as a number"];
             assert!(
                 expected.iter().any(|text| error.expected.contains(text)),

@@ -14,7 +14,8 @@ const EXPECTED: &str = "a point cloud as PLY, PCD, XYZ, CSV or NPY";
 
 /// Reads a point cloud, recognized by its first bytes.
 ///
-/// - PLY: as [`read_point_cloud_ply`](crate::read_point_cloud_ply).
+/// - PLY: the vertices of text and binary files. Normals are read if the vertices have `nx`, `ny`
+///   and `nz`, and are normalized. Faces and other elements are skipped.
 /// - PCD: text, binary and compressed, with `x`, `y`, `z` and, if there, `normal_x`, `normal_y` and
 ///   `normal_z`. The viewpoint is not applied.
 /// - Text (XYZ, CSV, PTS): one point per line, separated by white space or commas. The names of the
@@ -28,7 +29,8 @@ const EXPECTED: &str = "a point cloud as PLY, PCD, XYZ, CSV or NPY";
 ///
 /// [`IoError`] names the file and the place of the fault: a malformed or truncated file, more
 /// points than [`ReadLimits::DEFAULT`] allows or than the file holds, a coordinate beyond
-/// `hicp_core::MAX_COORDINATE_METERS`, or no points (never for PLY).
+/// `hicp_core::MAX_COORDINATE_METERS`, a normal in a PLY file that has no direction, or no points
+/// (never for PLY).
 pub fn read_cloud(path: impl AsRef<Path>, unit: LengthUnit) -> Result<PointCloud, IoError> {
     ReadLimits::DEFAULT.read_cloud(path, unit)
 }

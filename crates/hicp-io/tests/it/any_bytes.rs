@@ -4,8 +4,8 @@ use std::path::Path;
 
 use hicp_io::bop::{read_detections, read_models_info, read_results, read_targets};
 use hicp_io::{
-    IoError, LengthUnit, read_camera_json, read_color, read_depth_png, read_mask_png, read_mesh,
-    read_point_cloud_ply, read_pose_json,
+    IoError, LengthUnit, read_camera_json, read_cloud, read_color, read_depth_png, read_mask_png,
+    read_mesh, read_pose_json,
 };
 use proptest::prelude::*;
 
@@ -21,7 +21,7 @@ const READERS: [(&str, &[&str], Reader); 13] = [
     ),
     ("a.ply", PLY, |p| mesh(p)),
     ("b.ply", PLY, |p| {
-        read_point_cloud_ply(p, LengthUnit::Meters).map(drop)
+        read_cloud(p, LengthUnit::Meters).map(drop)
     }),
     ("a.png", PNG, |p| read_depth_png(p, 1.0).map(drop)),
     ("b.png", PNG, |p| read_mask_png(p).map(drop)),

@@ -14,10 +14,6 @@ fn models_and_masks_have_six_digits() {
     std::fs::write(dir.path().join("scene_camera.json"), "{}").unwrap();
     let scene = Scene::open(dir.path()).unwrap();
     assert_eq!(
-        scene.full_mask_path(12, 3),
-        dir.path().join("mask/000012_000003.png")
-    );
-    assert_eq!(
         scene.visible_mask_path(12, 3),
         dir.path().join("mask_visib/000012_000003.png")
     );

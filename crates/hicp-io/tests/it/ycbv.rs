@@ -1,7 +1,7 @@
 //! A real dataset in BOP's layout, read completely.
 
 use hicp_core::se3;
-use hicp_io::bop::{Dataset, ResultFileName, Rle, read_results, write_results};
+use hicp_io::bop::{Dataset, Rle, read_results, write_results};
 
 #[test]
 fn scenes_models_and_targets_agree() {
@@ -75,11 +75,7 @@ fn results_are_near_the_truth_and_written_back_with_the_same_numbers() {
     let mut files = 0;
     for file in std::fs::read_dir(&folder).unwrap() {
         let file = file.unwrap().path();
-        let name = ResultFileName::parse(&file).unwrap();
-        assert_eq!(
-            (name.dataset.as_str(), name.split_folder().as_str()),
-            ("ycbv", "test")
-        );
+        assert!(file.to_string_lossy().ends_with("_ycbv-test.csv"));
         let rows = read_results(&file).unwrap();
         assert!(!rows.is_empty());
         let mut near = 0;
