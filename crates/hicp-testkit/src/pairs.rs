@@ -1,7 +1,7 @@
 //! The pairs on which filters and metrics are tested.
 
 use hybrid_icp::association::{DataAssociation, NearestNeighbor, PointSelection, VisibleSurface};
-use hybrid_icp::core::{Correspondences, Isometry3, Pair, Point3, Problem};
+use hybrid_icp::core::{Correspondences, Isometry3, Pair, Point3, Problem, UnitVector3, Vector3};
 
 use crate::scenes::{Scene, scenes, workspace};
 
@@ -77,6 +77,15 @@ pub(crate) fn hard_pairs() -> Vec<PairSet> {
         change(&mut pairs[5]);
         pairs
     };
+    let scaled = |factor: f32| {
+        let mut pairs = all.to_vec();
+        for pair in &mut pairs {
+            for point in [&mut pair.source.point, &mut pair.target.point] {
+                *point = point.map(|x| x.clamp(-1.0, 1.0) * factor);
+            }
+        }
+        pairs
+    };
     let mut on_a_line = all.to_vec();
     for (pair, millimeters) in on_a_line.iter_mut().zip((0..100_u8).cycle()) {
         pair.source.point = Point3::new(0.0, 0.0, 0.4 + f32::from(millimeters) * 1e-3);
@@ -101,5 +110,11 @@ pub(crate) fn hard_pairs() -> Vec<PairSet> {
             every(|p| p.target.point.z = f32::INFINITY),
         ),
         with("one weight of NaN", fifth(|p| p.weight = f32::NAN)),
+        with(
+            "target normals of zero",
+            every(|p| p.target.normal = UnitVector3::new_unchecked(Vector3::zeros())),
+        ),
+        with("the smallest lengths of f32", scaled(1e-38)),
+        with("the largest lengths of f32", scaled(3e38)),
     ]
 }
