@@ -15,7 +15,7 @@ use std::sync::Arc;
 use hicp_core::{DepthImage, ImageError, Isometry3, Mask, Matrix6, Model, PinholeCamera, se3};
 use hicp_score::Evidence;
 
-use self::finder::CLEARLY;
+use self::finder::{CERTAIN, CLEARLY};
 use self::found::Found;
 use self::matcher::Matcher;
 use self::motion::Motion;
@@ -43,9 +43,9 @@ const NEAR_DIAMETERS: f64 = 0.4;
 /// The [`Evidence`] at the pose decides about the state. A hidden pixel is never evidence for a
 /// pose: an object that is hidden entirely is lost after
 /// [`TrackerConfig::coast_seconds`]. A lost object is searched, in a region that grows with time,
-/// among the surfaces of about its size. A found pose is [`TrackState::Doubtful`] until the next
-/// image confirms it. If a pose that looks like it is as likely, it stays doubtful until an image
-/// shows the difference.
+/// among the surfaces of about its size. A found pose that is not nearly certain is
+/// [`TrackState::Doubtful`] until the next image confirms it. If a pose that looks like it is as
+/// likely, it stays doubtful until an image shows the difference.
 ///
 /// Cost of a step while tracking: about that of `hybrid`, including the observation. A step that
 /// searches for the object costs about 0.1 s, and rarely up to 1 s. Use one tracker per object and
@@ -198,12 +198,12 @@ impl Tracker {
                 let (again, ambiguous) = self.matcher.settle(depth, mask, again, Some(&around))?;
                 (motion, seen) = (self.at(&again), Some(again.0));
                 self.ambiguous = ambiguous;
+                confirmed = self.matcher.log_odds(&again.0, &around) > CERTAIN;
                 self.trial = Some(Trial {
                     without: around,
-                    confirmed: false,
+                    confirmed,
                     tracked: 0.0,
                 });
-                confirmed = false;
             }
         }
         self.unseen = if seen.is_some() {
@@ -267,7 +267,7 @@ impl Tracker {
 struct Trial {
     /// The motion without it.
     without: Motion,
-    /// `true` if another image showed the object there.
+    /// `true` if the pose is nearly certain, or another image showed the object there.
     confirmed: bool,
     /// Time for which the state has been [`TrackState::Tracking`] since, seconds.
     tracked: f64,

@@ -21,6 +21,8 @@ const CLEAR_MVE: f64 = 0.01;
 const CLEAR_ODDS: f64 = 2.5;
 /// Smallest logarithm of the odds that a found pose is right.
 const LIKELY: f64 = 1.5;
+/// The same of a pose that needs no second image.
+pub(super) const CERTAIN: f64 = 4.0;
 /// Number of surfaces that are searched in an image.
 const SEGMENTS: usize = 2;
 /// Axes of the camera around which a search rotates the predicted pose, and the angle, radians.
@@ -158,7 +160,7 @@ impl Matcher {
     /// Returns the logarithm of the odds that a pose is right, given the predicted place.
     ///
     /// Far away, more surfaces look like the object.
-    fn log_odds(&self, found: &Found, motion: &Motion) -> f64 {
+    pub(super) fn log_odds(&self, found: &Found, motion: &Motion) -> f64 {
         let covariance = motion.covariance().fixed_view::<3, 3>(0, 0).into_owned();
         let shift = found.pose * self.model.center() - motion.center();
         let inverse = covariance.try_inverse().unwrap_or_default();
