@@ -15,9 +15,9 @@ use super::segments::{Segment, Segments, Sphere};
 
 /// Difference in merit by which a pose is clearly better than another one.
 pub(super) const CLEARLY: f64 = 0.03;
-/// Difference in MVE by which a pose is clearly better than one that looks like it, and the same
-/// in logarithms of their probabilities.
+/// Difference in MVE by which a pose is clearly better than one that looks like it.
 const CLEAR_MVE: f64 = 0.01;
+/// Difference of the logarithms of two probabilities for the same.
 const CLEAR_ODDS: f64 = 2.5;
 /// Smallest logarithm of the odds that a found pose is right.
 const LIKELY: f64 = 1.5;

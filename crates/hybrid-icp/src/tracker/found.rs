@@ -8,9 +8,8 @@ use hicp_score::Evidence;
 const AGREES: f64 = 0.1;
 /// Median distance from the mean of a normal distribution of deviation 1.
 const MEDIAN: f64 = 0.6745;
-/// Factor on the square of [`Evidence::noise`], which lacks the pixels that do not agree.
-///
-/// With it, the noise is right within a quarter up to a deviation of 0.15 diameters.
+/// Factor on the square of [`Evidence::noise`]. It makes up for the pixels that do not agree, which
+/// are not part of the noise and are many if it is strong.
 const CUT: f64 = 25.0;
 /// Confidence of a pose that is as good as a right one usually is.
 const SURE: f64 = 0.9;

@@ -4,7 +4,7 @@ use hicp_core::Point3;
 
 use super::segments::Segment;
 
-/// Number of frames after which a surface is searched again: first, and at most.
+/// Number of frames until a surface is searched again: after the first search, and at most.
 const REST: usize = 1;
 const LONGEST_REST: usize = 80;
 /// Movement in diameters and relative change of the area above which a surface is another one.
