@@ -79,7 +79,7 @@ declare! {
     Search, "search", search,
         "global: local, and if doubt × score is above 0.002 a search over 1000 rotations; may end at an equivalent pose";
     Auto, "auto", auto,
-        "global where needed: local, and if doubt × score is above 0.03 a search over 512 rotations";
+        "global where needed: local, and if doubt × score is above 0.03 a search over 1000 rotations, or above 0.002 far from the initial pose";
     Color, "color", color,
         "global where needed: auto, and color decides among poses that depth cannot tell apart";
 }

@@ -277,10 +277,6 @@ pub fn estimate_with<S>(
 ) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd, Doubt> {
     let options = SearchOptions {
         start: Start::Ignored,
-        good_enough: 0.02,
-        hypotheses: 1000,
-        aligned: 256,
-        refined: 24,
         ..SearchOptions::default()
     };
     search_from(stage, options)
@@ -308,8 +304,10 @@ pub fn search_with(options: SearchOptions) -> Search {
 /// `search`: [`local`], followed by a search if the product of its doubt and its score is above
 /// 0.002.
 ///
-/// The search ranks 1000 rotations, aligns 256 of them and refines 24. The result can be far from
-/// the initial pose, also at a pose that is equivalent by symmetry.
+/// The search ranks 1000 rotations, aligns 256 of them and refines 24. If the local pose is near
+/// the initial one, it aligns and refines a quarter of these. Otherwise it goes on with all
+/// rotations while the pose stays bad. A hypothesis must beat the local pose by a gain. The result
+/// can be far from the initial pose, also at a pose that is equivalent by symmetry.
 #[must_use]
 pub fn search() -> Search {
     search_with(SearchOptions::default())
@@ -342,21 +340,12 @@ pub fn color() -> ByColor<Search> {
     by_color(auto())
 }
 
-/// `auto`: [`local`], followed by a search if the product of its doubt and its score is above 0.03.
-///
-/// If the local pose is far from the initial one, the threshold is 0.005. The search ranks 512
-/// rotations, aligns 128 of them and refines 12, and goes on with all of them if the pose stays bad
-/// and far from the initial one. A hypothesis must beat the local pose by a gain; the result can
-/// then be far from the initial pose.
+/// `auto`: as [`search()`], but near the initial pose the product of doubt and score must be above
+/// 0.03.
 #[must_use]
 pub fn auto() -> Search {
     search_with(SearchOptions {
         threshold: 0.03,
-        far_threshold: 0.005,
-        good_enough: 0.05,
-        hypotheses: 512,
-        aligned: 128,
-        refined: 12,
         ..SearchOptions::default()
     })
 }

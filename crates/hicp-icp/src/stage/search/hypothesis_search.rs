@@ -20,7 +20,8 @@ use crate::stage::stage_trait::Stage;
 ///    initial and the local pose. Each is placed such that its visible centroid is the observed
 ///    one. The best are kept.
 /// 2. **Align**: a stage that costs as much as some scores moves each to the image. The best that
-///    differ are kept.
+///    differ are kept. If the local pose is near the initial one, a hypothesis must win by more, so
+///    only a quarter of the best are aligned and refined.
 /// 3. **Try**: the local stage refines the best of the first 32. If that is good enough, the others
 ///    are not aligned, and nothing is explored.
 /// 4. **Explore**: a stage that costs some hundred scores refines each. If the best pose is still
@@ -148,13 +149,13 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
 
     /// Returns whether no further poses are needed.
     fn is_good(&mut self, run: &mut Run<'_, '_>) -> bool {
-        self.doubt(run) <= self.options.good_enough && !self.is_bad(run, UNEXPLAINED)
+        self.doubt(run) <= run.options.good_enough && !self.is_bad(run, UNEXPLAINED)
     }
 
     /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
     fn rank(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
         self.ranked.clear();
-        let options = self.options;
+        let options = run.options;
         let Some(from) = Hypotheses::new(run.problem, run.init, options.bound) else {
             return;
         };
@@ -215,11 +216,11 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
     }
 
     /// Searches the whole range for poses. A search that has failed goes on if it `widens`.
-    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>, widens: bool) {
+    fn search(&mut self, run: &mut Run<'_, '_>, local: &Isometry3<f64>) {
         self.rank(run, local);
         let ranked = std::mem::take(&mut self.ranked);
         let poses = ranked.poses();
-        let options = self.options;
+        let options = run.options;
         let kept = (options.refined, options.spacing_degrees);
         let most = options.aligned.min(poses.len());
         let first = FIRST.min(most);
@@ -229,7 +230,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         if !self.is_good(run) {
             self.align(run, &poses[first..most], kept);
             self.explore(run, true);
-            if widens && self.is_bad(run, options.threshold.max(FAILED)) {
+            if options.widens && self.is_bad(run, options.threshold.max(FAILED)) {
                 self.aligned.clear();
                 self.align(run, poses, (2 * kept.0, 0.5 * kept.1));
                 self.explore(run, true);
@@ -257,10 +258,38 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         self.aligned = aligned;
     }
 
+    /// Refines poses that look like the best one found.
+    fn try_look_alikes(&mut self, run: &mut Run<'_, '_>, threshold: f64) {
+        let Some(best) = self.found.best().copied() else {
+            return;
+        };
+        let bad = self.is_bad(run, threshold);
+        let mut alike = std::mem::take(&mut self.alike);
+        let scores = (&mut self.ranking, &mut self.score);
+        let listed = alike.list(run, (&best, bad), scores);
+        if !bad {
+            // A look-alike of a pose that fits may fit as it is.
+            for (score, pose) in listed.poses() {
+                let as_it_is = Found {
+                    score: *score,
+                    outcome: Outcome::refined(*pose, Termination::Converged),
+                    doubt: None,
+                    finished: false,
+                };
+                self.found.add(as_it_is, &run.distinct);
+            }
+        }
+        self.aligned.clear();
+        let kept = (run.options.refined, run.options.spacing_degrees);
+        self.align(run, listed.poses(), kept);
+        self.alike = alike;
+        self.explore(run, false);
+    }
+
     /// Refines the best of all poses found by the local stage, until one is good enough.
     fn finish(&mut self, run: &mut Run<'_, '_>) {
-        for finalist in 0..FINALISTS.max(self.options.refined / 3) {
-            let good = |best: Found| best.doubt() <= self.options.good_enough;
+        for finalist in 0..FINALISTS.max(run.options.refined / 3) {
+            let good = |best: Found| best.doubt() <= run.options.good_enough;
             let enough = finalist >= FINALISTS && self.found.cheapest().is_some_and(good);
             if enough || run.is_over() {
                 return;
@@ -322,7 +351,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         let mut run = Run {
             problem,
             init,
-            bound: self.options.bound,
+            options: self.options,
             distinct: Distinct::of(model),
             clock,
             iterations: local.iterations,
@@ -332,12 +361,14 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         if !run.allows(&local.camera_from_object) {
             local = Outcome::kept(init, Termination::OutOfBounds);
         }
-        let (mut threshold, mut gain) = (self.options.threshold, self.options.near_gain);
         let pose = local.camera_from_object;
-        let far = !run.distinct.near(init, &pose);
-        if far {
-            (threshold, gain) = (self.options.far_threshold, self.options.far_gain);
-        }
+        let far = ignored || !run.distinct.near(init, &pose);
+        let (threshold, gain) = if far {
+            (self.options.far_threshold, self.options.far_gain)
+        } else {
+            run.options = self.options.near();
+            (self.options.threshold, self.options.near_gain)
+        };
         if !ignored {
             self.add(&mut run, local, true);
         }
@@ -346,32 +377,9 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         let beatable = from.is_none_or(|from| from.cost() > gain);
         let bad = beatable && self.is_bad(&mut run, threshold);
         if bad {
-            let widens = self.options.widens && (far || ignored);
-            self.search(&mut run, &pose, widens);
+            self.search(&mut run, &pose);
         }
-        if let Some(best) = self.found.best().copied() {
-            let bad = self.is_bad(&mut run, threshold);
-            let mut alike = std::mem::take(&mut self.alike);
-            let scores = (&mut self.ranking, &mut self.score);
-            let listed = alike.list(&mut run, (&best, bad), scores, &self.options);
-            if !bad {
-                // A look-alike of a pose that fits may fit as it is.
-                for (score, pose) in listed.poses() {
-                    let as_it_is = Found {
-                        score: *score,
-                        outcome: Outcome::refined(*pose, Termination::Converged),
-                        doubt: None,
-                        finished: false,
-                    };
-                    self.found.add(as_it_is, &run.distinct);
-                }
-            }
-            self.aligned.clear();
-            let kept = (self.options.refined, self.options.spacing_degrees);
-            self.align(&mut run, listed.poses(), kept);
-            self.alike = alike;
-            self.explore(&mut run, false);
-        }
+        self.try_look_alikes(&mut run, threshold);
         self.finish(&mut run);
         let (mut returned, mut score) = (local, from.map_or(f64::INFINITY, |from| from.score));
         if let Some(best) = self.found.cheapest()

@@ -6,7 +6,6 @@ use hicp_score::Score;
 use crate::alternative::Alternative;
 use crate::stage::search::found::Found;
 use crate::stage::search::near_symmetries::NearSymmetries;
-use crate::stage::search::options::SearchOptions;
 use crate::stage::search::run::Run;
 use crate::stage::search::shortlist::Shortlist;
 
@@ -33,7 +32,6 @@ impl LookAlikes {
         run: &mut Run<'_, '_>,
         (best, bad): (&Found, bool),
         (ranking, score): (&mut impl Score, &mut impl Score),
-        options: &SearchOptions,
     ) -> &Shortlist {
         self.ranked.clear();
         self.listed.clear();
@@ -47,8 +45,8 @@ impl LookAlikes {
         let base = &best.outcome.camera_from_object;
         let gap = if bad { f64::INFINITY } else { MAX_GAP };
         let limit = run.score(ranking, base) + gap;
-        let spacing = options.spacing_degrees;
-        let refined = options.refined.div_ceil(3);
+        let spacing = run.options.spacing_degrees;
+        let refined = run.options.refined.div_ceil(3);
         for index in near.undecided(observation, base, model.diameter()) {
             if run.is_over() {
                 return &self.listed;

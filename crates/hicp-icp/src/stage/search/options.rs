@@ -32,7 +32,7 @@ pub struct SearchOptions {
     /// doubt. A doubt below 0.05 counts as 0.05. At or below the threshold, or if no pose can win
     /// by the gain, only poses that look like the local one are tried.
     pub threshold: f64,
-    /// The threshold if the local pose is far from the initial one.
+    /// The threshold if the local pose is far from the initial one, or if that is ignored.
     pub far_threshold: f64,
     /// The doubt at which no further hypotheses are refined, unless the score is above 0.04.
     pub good_enough: f64,
@@ -50,9 +50,11 @@ pub struct SearchOptions {
     pub rotations: Rotations,
     /// Number of these rotations.
     pub hypotheses: usize,
-    /// Number of best ranked hypotheses to align.
+    /// Number of best ranked hypotheses to align; a quarter if the local pose is near the initial
+    /// one.
     pub aligned: usize,
-    /// Number of best aligned hypotheses to refine.
+    /// Number of best aligned hypotheses to refine; a quarter if the local pose is near the initial
+    /// one.
     ///
     /// A third as many look-alikes of the best one are refined, and the local stage finishes at
     /// most a third as many poses.
@@ -79,7 +81,8 @@ pub struct SearchOptions {
 impl Default for SearchOptions {
     /// 1000 rotations of SO(3), without a bound.
     ///
-    /// Of these, 256 are aligned, and 24 at least 20° apart are refined.
+    /// Of these, 256 are aligned, and 24 at least 20° apart are refined. Near the initial pose, it
+    /// is a quarter of both.
     ///
     /// The search starts if doubt × score is above 0.002. A hypothesis must be better by 0.1, or by
     /// 0.04 if the local pose is far from the initial one.
@@ -99,6 +102,20 @@ impl Default for SearchOptions {
             widens: true,
             bound: None,
             time_limit: None,
+        }
+    }
+}
+
+impl SearchOptions {
+    /// Returns the options for a local pose near the initial one.
+    ///
+    /// Such a pose is rarely wrong, and a hypothesis must beat it by more.
+    pub(crate) fn near(self) -> Self {
+        Self {
+            aligned: self.aligned.div_ceil(4),
+            refined: self.refined.div_ceil(4),
+            widens: false,
+            ..self
         }
     }
 }

@@ -9,14 +9,14 @@ use hicp_score::Score;
 use crate::outcome::{Outcome, Termination};
 use crate::session::Session;
 use crate::stage::search::distinct::Distinct;
+use crate::stage::search::options::SearchOptions;
 use crate::stage::stage_trait::Stage;
-use crate::stop::motion::Bound;
 
 /// The inputs of a search, and what it has spent.
 pub(crate) struct Run<'a, 's> {
     pub(crate) problem: &'a Problem<'a>,
     pub(crate) init: &'a Isometry3<f64>,
-    pub(crate) bound: Option<Bound>,
+    pub(crate) options: SearchOptions,
     pub(crate) distinct: Arc<Distinct>,
     pub(crate) clock: Clock,
     pub(crate) session: &'a mut Session<'s>,
@@ -41,7 +41,8 @@ impl Run<'_, '_> {
 
     /// Returns whether a pose lies within the bound.
     pub(crate) fn allows(&self, pose: &Isometry3<f64>) -> bool {
-        self.bound.is_none_or(|b| b.contains(self.init, pose))
+        let bound = self.options.bound;
+        bound.is_none_or(|bound| bound.contains(self.init, pose))
     }
 
     /// Returns whether the observer or the time limit ends the search.
