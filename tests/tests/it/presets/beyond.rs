@@ -264,6 +264,25 @@ fn poses_that_look_the_same_are_ambiguous_unless_declared() {
     assert!(!ambiguous(Preset::Local, &undeclared));
 }
 
+/// Of the poses that look the same, a search returns the one nearest to the initial rotation.
+#[test]
+fn a_search_keeps_the_rotation_that_the_image_does_not_show() {
+    for seed in [1, 3, 4, 5] {
+        let scene = scene(Household::Can, 0.3, &mut rng(seed));
+        let undeclared = Model::new(scene.model.mesh().clone());
+        // Beside the object, from where `local` does not find it.
+        let init = Isometry3::translation(0.5, 0.0, 0.0) * scene.truth;
+        let error = |preset| {
+            let found = Refiner::preset(preset).refine(&undeclared, &scene.observation, &init);
+            se3::pose_distance(&found.outcome.camera_from_object, &scene.truth)
+        };
+        assert!(error(Preset::Local).1 > 0.03);
+        let (angle, distance) = error(Preset::Search);
+        assert!(angle.to_degrees() < 20.0, "{seed}: {angle}");
+        assert!(distance < 1e-3, "{seed}: {distance}");
+    }
+}
+
 #[test]
 fn a_flat_side_is_shifted_to_its_silhouette() {
     let scene = scene(Household::Carton, 0.0, &mut rng(7));

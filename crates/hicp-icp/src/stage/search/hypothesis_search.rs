@@ -8,7 +8,7 @@ use crate::session::Session;
 use crate::stage::search::distinct::Distinct;
 use crate::stage::search::found::{Found, FoundPoses, LEAST_DOUBT};
 use crate::stage::search::hypotheses::Hypotheses;
-use crate::stage::search::look_alikes::LookAlikes;
+use crate::stage::search::look_alikes::{LookAlikes, nearest_to_initial};
 use crate::stage::search::options::{SearchOptions, Start};
 use crate::stage::search::run::{Clock, Run};
 use crate::stage::search::shortlist::Shortlist;
@@ -37,7 +37,9 @@ use crate::stage::stage_trait::Stage;
 ///    `refined` if all stay doubtful. They are compared by score + doubt / 10.
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
-/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. The others are in
+/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. If another pose looks
+/// like it, is nearer to the initial rotation, and explains the image within 0.02 as well, that one
+/// is returned: the rotation of a can is often known from elsewhere. The others are in
 /// [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
 /// **This is not local refinement.** Unless a bound is set, it can end anywhere in the image, also
@@ -286,6 +288,28 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         self.explore(run, false);
     }
 
+    /// Returns the pose nearest to the initial one that looks like `best` and explains the image as
+    /// well, if it is another one.
+    fn nearest_alike(&mut self, run: &mut Run<'_, '_>, best: &Found) -> Option<Found> {
+        let start = nearest_to_initial(run, &best.outcome.camera_from_object)?;
+        if run.is_over() || run.score(&mut self.score, &start) > best.score + FINAL_GAP {
+            return None;
+        }
+        let next = run.refine(&mut self.stage, &start);
+        let outcome = Outcome::refined(start, Termination::Converged).then(next);
+        let pose = outcome.camera_from_object;
+        let score = run.score(&mut self.score, &pose);
+        if score > best.score + UNDECIDED || !run.allows(&pose) {
+            return None;
+        }
+        Some(Found {
+            score,
+            outcome,
+            doubt: Some(run.score(&mut self.doubt, &pose)),
+            finished: true,
+        })
+    }
+
     /// Refines the best of all poses found by the local stage, until one is good enough.
     fn finish(&mut self, run: &mut Run<'_, '_>) {
         for finalist in 0..FINALISTS.max(run.options.refined / 3) {
@@ -319,6 +343,8 @@ const FAILED: f64 = 0.02;
 const FINALISTS: usize = 2;
 /// Largest gap in score between them and the best one.
 const FINAL_GAP: f64 = 0.1;
+/// Gap in score that errors of the sensor and the model can explain.
+const UNDECIDED: f64 = 0.02;
 
 impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
     for HypothesisSearch<S, A, E, R, C, D>
@@ -382,9 +408,14 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
         self.try_look_alikes(&mut run, threshold);
         self.finish(&mut run);
         let (mut returned, mut score) = (local, from.map_or(f64::INFINITY, |from| from.score));
-        if let Some(best) = self.found.cheapest()
-            && from.is_none_or(|from| best.beats(&from, gain))
-        {
+        let wins = |found: &Found, gain| from.is_none_or(|from| found.beats(&from, gain));
+        if let Some(best) = self.found.cheapest().filter(|best| wins(best, gain)) {
+            let nearest = if ignored {
+                None
+            } else {
+                self.nearest_alike(&mut run, &best)
+            };
+            let best = nearest.filter(|found| wins(found, 0.0)).unwrap_or(best);
             (returned, score) = (best.outcome, best.score);
         }
         self.found.list_alternatives(

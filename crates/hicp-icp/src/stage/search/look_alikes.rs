@@ -75,6 +75,23 @@ impl LookAlikes {
     }
 }
 
+/// Returns the pose nearest to the initial one, by its rotation, among those that look like `pose`.
+///
+/// Returns `None` if none of them is nearer than `pose`.
+pub(crate) fn nearest_to_initial(
+    run: &Run<'_, '_>,
+    pose: &Isometry3<f64>,
+) -> Option<Isometry3<f64>> {
+    let (model, observation) = run.problem.sides()?;
+    let near = NearSymmetries::of(model);
+    let degrees = |pose: &Isometry3<f64>| run.distinct.degrees(run.init, pose);
+    let undecided = near.undecided(observation, pose, model.diameter());
+    let nearest = undecided
+        .map(|index| pose * near.motion(index))
+        .min_by(|a, b| degrees(a).total_cmp(&degrees(b)))?;
+    (degrees(&nearest) < degrees(pose)).then_some(nearest)
+}
+
 /// Counts the poses that look like a given one and explain the image as well.
 ///
 /// A pose looks like another one if the model nearly covers it, such as a mug that is rotated
