@@ -50,7 +50,7 @@ use crate::stage::stage_trait::Stage;
 /// pose outside of it is never returned; the initial pose replaces a local pose that is outside.
 ///
 /// Cost: the local stage. If doubt × score is above the threshold, also `hypotheses` × the ranking
-/// score, `aligned` × the aligning stage, 4/3 `refined` × the exploring stage, and the local stage
+/// score, `aligned` × the aligning stage, `refined` + 8 × the exploring stage, and the local stage
 /// three times. If all poses stay doubtful, the local stage runs up to 1/3 `refined` times, and if
 /// the search goes on, it costs about three times as much. The near symmetries of a model are found
 /// once, in some 10 ms.

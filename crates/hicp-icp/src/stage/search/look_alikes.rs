@@ -11,7 +11,9 @@ use crate::stage::search::shortlist::Shortlist;
 
 /// Largest number of look-alikes that are scored to count them.
 const SCORED: usize = 4;
-/// Number of refined poses that look like a good pose.
+/// Largest number of look-alikes that are refined.
+const REFINED: usize = 8;
+/// The same for a good pose.
 const ALIKE_OF_GOOD: usize = 2;
 /// Gap in score up to which a pose looks like a good one before it is refined.
 const MAX_GAP: f64 = 0.05;
@@ -46,7 +48,7 @@ impl LookAlikes {
         let gap = if bad { f64::INFINITY } else { MAX_GAP };
         let limit = run.score(ranking, base) + gap;
         let spacing = run.options.spacing_degrees;
-        let refined = run.options.refined.div_ceil(3);
+        let refined = run.options.refined.min(REFINED);
         for index in near.undecided(observation, base, model.diameter()) {
             if run.is_over() {
                 return &self.listed;

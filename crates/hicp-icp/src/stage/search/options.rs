@@ -56,8 +56,8 @@ pub struct SearchOptions {
     /// Number of best aligned hypotheses to refine; a quarter if the local pose is near the initial
     /// one.
     ///
-    /// A third as many look-alikes of the best one are refined, and the local stage finishes at
-    /// most a third as many poses.
+    /// At most eight look-alikes of the best one are refined, and the local stage finishes at most
+    /// a third as many poses.
     pub refined: usize,
     /// The smallest angle between the rotations of refined hypotheses, degrees.
     ///
