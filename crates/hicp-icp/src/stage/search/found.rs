@@ -38,9 +38,12 @@ impl Found {
 
     /// Returns whether the cost is lower by a gain, and neither score nor doubt is higher.
     ///
-    /// A doubt up to [`LEAST_DOUBT`] never counts as higher.
+    /// A doubt up to [`LEAST_DOUBT`] never counts as higher. Neither does one up to a half if the
+    /// score is half as high: a pose that explains little can be without doubt, by mistake.
     pub(crate) fn beats(&self, other: &Self, gain: f64) -> bool {
-        let worse = self.score > other.score || self.doubt() > other.doubt().max(LEAST_DOUBT);
+        let explains = 2.0 * self.score < other.score;
+        let limit = if explains { 0.5 } else { LEAST_DOUBT };
+        let worse = self.score > other.score || self.doubt() > other.doubt().max(limit);
         !worse && self.cost() < other.cost() - gain
     }
 }
@@ -141,7 +144,10 @@ mod tests {
         assert!(!found(0.31, 0.0).beats(&local, 0.0));
         // A doubt is not exact to a few percent.
         assert!(found(0.1, 0.04).beats(&found(0.3, 0.01), 0.1));
-        assert!(!found(0.1, 0.06).beats(&found(0.3, 0.01), 0.1));
+        assert!(!found(0.16, 0.06).beats(&found(0.3, 0.01), 0.1));
+        // Half of the score outweighs doubt, up to a half.
+        assert!(found(0.14, 0.4).beats(&found(0.3, 0.01), 0.1));
+        assert!(!found(0.01, 0.6).beats(&found(0.3, 0.01), 0.1));
         // An unknown doubt is the largest.
         let unknown = Found {
             doubt: None,

@@ -38,9 +38,10 @@ pub struct SearchOptions {
     pub good_enough: f64,
     /// The gain by which a hypothesis must beat a local pose near the initial pose.
     ///
-    /// Gains are in score + doubt / 10, and a hypothesis must not be more doubtful. Errors of
-    /// sensors and meshes make wrong sides of cans and bowls better by up to 0.07, so the initial
-    /// pose decides there. A pose is near up to an MSSD of a quarter of the diameter.
+    /// Gains are in score + doubt / 10. A hypothesis must not be more doubtful, unless it halves
+    /// the score and the doubt is below a half. Errors of sensors and meshes make wrong sides of
+    /// cans and bowls better by up to 0.07, so the initial pose decides there. A pose is near up to
+    /// an MSSD of a quarter of the diameter.
     pub near_gain: f64,
     /// The gain by which it must beat a local pose far from the initial pose.
     ///
