@@ -5,7 +5,7 @@ use std::error::Error;
 use hicp_sim::{Household, Proportions, SimError, SimRng, invented, stream};
 use hicp_tests::symmetric_pose_distance;
 use hicp_tests::tabletop::{MaskKind, Seen, Tabletop};
-use hybrid_icp::core::{Isometry3, Model, Observation, Problem};
+use hybrid_icp::core::{DepthImage, Isometry3, Model, Observation, Problem};
 use hybrid_icp::prelude::{Repeat, Stage};
 use hybrid_icp::score::{Confidence, Misfit, ModelPoints, N_FEATURES};
 use hybrid_icp::{Preset, Refinement, Refiner, presets};
@@ -151,16 +151,26 @@ impl Objects {
     }
 }
 
+/// The images of simulated cases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Images {
+    /// White noise.
+    Noisy,
+    /// Systematic errors of the sensor, and a model that is not quite that of the object.
+    Distorted,
+    /// White noise, and nothing measured outside of the mask.
+    Cropped,
+}
+
 /// Factors of width and height of models that do not quite fit.
 const ROUGH: (f64, f64) = (1.015, 0.985);
 
 /// Simulates cases of some objects until there are `count`.
 ///
-/// If `distorted`, the sensor has systematic errors, and the model is not quite that of the object.
 /// Every visible object gets several poses, each with another random kind of mask.
 pub fn simulate(
     objects: &Objects,
-    distorted: bool,
+    images: Images,
     seed: u64,
     count: usize,
 ) -> Result<Vec<Case>, Box<dyn Error>> {
@@ -171,7 +181,7 @@ pub fn simulate(
     let mut cases = Vec::new();
     let models = all.iter().zip(&all_rough).zip(&all_alike);
     for (scene, ((exact, rough), alike)) in (seed..).zip(models.cycle()) {
-        let (scenes, visible) = if distorted {
+        let (scenes, visible) = if images == Images::Distorted {
             (rough, exact.distorted_scene(scene)?)
         } else {
             (exact, exact.scene(scene)?)
@@ -196,7 +206,13 @@ pub fn simulate(
             ];
             for (kind, model) in kinds {
                 let refiner = &mut refiners[random.random_range(0..PRESETS.len())];
-                cases.push(case(refiner, &seen, kind, (own, model), &mut random)?);
+                cases.push(case(
+                    refiner,
+                    &seen,
+                    (kind, images),
+                    (own, model),
+                    &mut random,
+                )?);
             }
         }
         if cases.len() >= count {
@@ -215,10 +231,20 @@ fn unrefined() -> Refiner<impl Stage> {
     })
 }
 
+/// Returns an observation without the measurements outside of its mask.
+fn cropped(observation: &Observation) -> Result<Observation, Box<dyn Error>> {
+    let (depth, mask) = (observation.depth(), observation.mask());
+    let pixels = depth.pixels().iter().zip(mask.pixels());
+    let meters = pixels.map(|(z, masked)| if *masked { *z } else { 0.0 });
+    let depth = DepthImage::from_meters(depth.width(), depth.height(), meters.collect())?;
+    let camera = *observation.camera();
+    Ok(Observation::new(depth, mask.clone(), camera)?)
+}
+
 fn case(
     refiner: &mut Refiner,
     seen: &Seen,
-    kind: Kind,
+    (kind, images): (Kind, Images),
     (own, model): (&Model, &Model),
     random: &mut SimRng,
 ) -> Result<Case, Box<dyn Error>> {
@@ -226,6 +252,11 @@ fn case(
     let observation = match kind {
         Kind::Wall => seen.walled(random)?.observe(mask)?,
         _ => seen.observe(mask)?,
+    };
+    let observation = if images == Images::Cropped {
+        cropped(&observation)?
+    } else {
+        observation
     };
     let factor = 2.0 * random.random::<f64>();
     let init = match kind {

@@ -3,7 +3,8 @@
 //! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
 //! objects. With `-- fit [CASES]`, it prints the network, fitted on tuning and invented objects: so
 //! many cases with white noise, and as many with systematic errors of sensor and model. With `--
-//! tuning [CASES]` or `-- distorted [CASES]`, it reports on other cases of tuning objects.
+//! tuning [CASES]` or `-- distorted [CASES]`, it reports on other cases of tuning objects, and with
+//! `-- cropped [CASES]` on test objects in images with no measurement outside of the mask.
 
 mod cases;
 mod fit;
@@ -12,7 +13,7 @@ mod real;
 use hicp_sim::Household;
 use hybrid_icp::score::{LabeledScore, reliability, roc_area};
 
-use crate::cases::{Case, Kind, Objects};
+use crate::cases::{Case, Images, Kind, Objects};
 
 /// Confidence at which a pose is accepted.
 const ACCEPTED: f64 = 0.95;
@@ -25,26 +26,33 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .unwrap_or(6000);
     match arguments.first().map(String::as_str) {
         Some("fit") => {
-            let half = |distorted| {
-                let objects = Objects::ForFit(u64::from(distorted));
-                let cases = cases::simulate(&objects, distorted, 0, count);
+            let half = |images| {
+                let objects = Objects::ForFit(u64::from(images == Images::Distorted));
+                let cases = cases::simulate(&objects, images, 0, count);
                 cases.expect("the objects can be simulated")
             };
             let (mut cases, others) = std::thread::scope(|scope| {
-                let others = scope.spawn(|| half(true));
-                (half(false), others.join().expect("no panic"))
+                let others = scope.spawn(|| half(Images::Distorted));
+                (half(Images::Noisy), others.join().expect("no panic"))
             });
             cases.extend(others);
             fit::print(&cases);
         }
         Some(name @ ("tuning" | "distorted")) => {
             let objects = Objects::Household(&Household::TUNING);
-            let distorted = name == "distorted";
-            report(&cases::simulate(&objects, distorted, 1 << 20, count)?);
+            let images = match name {
+                "distorted" => Images::Distorted,
+                _ => Images::Noisy,
+            };
+            report(&cases::simulate(&objects, images, 1 << 20, count)?);
+        }
+        Some("cropped") => {
+            let objects = Objects::Household(&Household::TEST);
+            report(&cases::simulate(&objects, Images::Cropped, 0, count)?);
         }
         _ => {
             let objects = Objects::Household(&Household::TEST);
-            report(&cases::simulate(&objects, false, 0, count)?);
+            report(&cases::simulate(&objects, Images::Noisy, 0, count)?);
             if let Some(cases) = real::cases() {
                 println!("\n## Real frames\n");
                 report(&cases);

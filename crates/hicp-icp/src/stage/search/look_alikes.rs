@@ -77,7 +77,8 @@ impl LookAlikes {
     }
 }
 
-/// Returns the pose nearest to the initial one, by its rotation, among those that look like `pose`.
+/// Returns the pose nearest to the initial one, by its rotation, among those that look like `pose`
+/// and are apart from it.
 ///
 /// Returns `None` if none of them is nearer than `pose`.
 pub(crate) fn nearest_to_initial(
@@ -90,6 +91,7 @@ pub(crate) fn nearest_to_initial(
     let undecided = near.undecided(observation, pose, model.diameter());
     let nearest = undecided
         .map(|index| pose * near.motion(index))
+        .filter(|other| run.distinct.apart(other, pose))
         .min_by(|a, b| degrees(a).total_cmp(&degrees(b)))?;
     (degrees(&nearest) < degrees(pose)).then_some(nearest)
 }
