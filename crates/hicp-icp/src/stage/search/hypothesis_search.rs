@@ -51,9 +51,9 @@ use crate::stage::stage_trait::Stage;
 ///
 /// Cost: the local stage. If doubt × score is above the threshold, also `hypotheses` × the ranking
 /// score, `aligned` × the aligning stage, `refined` + 8 × the exploring stage, and the local stage
-/// three times. If all poses stay doubtful, the local stage runs up to 1/3 `refined` times, and if
-/// the search goes on, it costs about three times as much. The near symmetries of a model are found
-/// once, in some 10 ms.
+/// three or four times. If all poses stay doubtful, the local stage runs up to 1/3 `refined` times,
+/// and if the search goes on, it costs about three times as much. The near symmetries of a model
+/// are found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, A, E, R, C, D> {
     /// Refines the initial pose, and the best hypotheses.
