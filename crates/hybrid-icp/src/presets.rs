@@ -46,7 +46,7 @@ mod beyond;
 
 pub use beyond::{
     Align, ByColor, CloudToModelIcp, Explore, Far, Fit, GatedIcp, HybridVisible, Local, Near,
-    Search, Steps, auto, by_color, color, estimate_with, hybrid_visible, local, search,
+    Search, SearchFrom, Steps, auto, by_color, color, estimate_with, hybrid_visible, local, search,
     search_with,
 };
 pub(crate) use beyond::{far, fit, look_alikes};

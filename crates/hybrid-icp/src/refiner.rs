@@ -188,7 +188,7 @@ impl<S: Stage> Refiner<S> {
     /// Finds the pose of a segmented object (`camera_from_object`, meters) without an initial pose.
     ///
     /// A [`HypothesisSearch`](hicp_icp::HypothesisSearch) ranks rotations of SO(3), placed at the
-    /// observed points. It refines the best of them cheaply, and then with this refiner's stage.
+    /// observed points, and fits the best of them. This refiner's stage then refines what is found.
     /// `mve_initial` equals `mve`, because there is no initial pose.
     ///
     /// Never fails on data: if no surface was measured inside the mask, the outcome keeps the

@@ -21,6 +21,9 @@ const DECAY: f64 = 5e-5;
 /// Steps of Adam, and the size of the first ones. The size falls to 0 as a cosine.
 const STEPS: i32 = 2000;
 const STEP: f64 = 0.02;
+/// Seed of the initial parameters. Of the seeds 0 to 3, this one leads to the lowest calibration
+/// errors on other cases of tuning objects.
+const SEED: u64 = 2;
 
 type Parameters = [f64; PARAMETERS];
 
@@ -85,7 +88,7 @@ fn mean_and_deviation(values: impl Iterator<Item = f64>) -> (f64, f64) {
 
 /// Minimizes the loss by Adam over all rows.
 fn fit(rows: &[Row]) -> Parameters {
-    let mut random: SimRng = stream(0, &["network"], 0);
+    let mut random: SimRng = stream(SEED, &["network"], 0);
     let mut parameters: Parameters = std::array::from_fn(|_| 0.5 * (random.random::<f64>() - 0.5));
     let (mut mean, mut square) = ([0.0; PARAMETERS], [0.0; PARAMETERS]);
     for step in 1..=STEPS {

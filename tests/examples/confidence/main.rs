@@ -2,9 +2,10 @@
 //!
 //! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
 //! objects. With `-- fit [CASES]`, it prints the network, fitted on tuning and invented objects: so
-//! many cases with white noise, and as many with systematic errors of sensor and model. With `--
-//! tuning [CASES]` or `-- distorted [CASES]`, it reports on other cases of tuning objects, and with
-//! `-- cropped [CASES]` on test objects in images with no measurement outside of the mask.
+//! many cases with white noise, as many with systematic errors of sensor and model, and half as
+//! many with no measurement outside of the mask. With `-- tuning [CASES]` or `-- distorted
+//! [CASES]`, it reports on other cases of tuning objects, and with `-- cropped [CASES]` on test
+//! objects in images with no measurement outside of the mask.
 
 mod cases;
 mod fit;
@@ -26,16 +27,25 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .unwrap_or(6000);
     match arguments.first().map(String::as_str) {
         Some("fit") => {
-            let half = |images| {
-                let objects = Objects::ForFit(u64::from(images == Images::Distorted));
-                let cases = cases::simulate(&objects, images, 0, count);
+            let parts = [
+                (Images::Noisy, count),
+                (Images::Distorted, count),
+                (Images::Cropped, count / 2),
+            ];
+            let simulate = |(set, (images, count))| {
+                let cases = cases::simulate(&Objects::ForFit(set), images, 0, count);
                 cases.expect("the objects can be simulated")
             };
-            let (mut cases, others) = std::thread::scope(|scope| {
-                let others = scope.spawn(|| half(Images::Distorted));
-                (half(Images::Noisy), others.join().expect("no panic"))
+            let cases: Vec<Case> = std::thread::scope(|scope| {
+                let parts = (0..).zip(parts);
+                let threads: Vec<_> = parts
+                    .map(|part| scope.spawn(move || simulate(part)))
+                    .collect();
+                let parts = threads
+                    .into_iter()
+                    .map(|thread| thread.join().expect("no panic"));
+                parts.flatten().collect()
             });
-            cases.extend(others);
             fit::print(&cases);
         }
         Some(name @ ("tuning" | "distorted")) => {

@@ -107,11 +107,14 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_stage("hypothesis-search", |p| {
         p.about = "Runs a local stage; where its score stays bad, runs it again from the best of \
             many rotations. Not local. Cost: the stage; where it fails hypotheses × ranking, \
-            aligned × align and refined × explore.";
+            aligned × align, refined × explore and up to refined × finish.";
         let search = HypothesisSearch::new(
             p.part::<BoxedStage>("stage", None, "refines locally")?,
-            p.part::<BoxedStage>("align", "ray-shift", "moves many hypotheses, very cheaply")?,
-            p.part::<BoxedStage>("explore", None, "refines the best of them, cheaply")?,
+            (
+                p.part::<BoxedStage>("align", "ray-shift", "moves many hypotheses, very cheaply")?,
+                p.part::<BoxedStage>("explore", None, "refines the best of them, cheaply")?,
+                p.part::<BoxedStage>("finish", "ray-shift", "fits those that may be right")?,
+            ),
             (
                 p.part::<BoxedScore>("ranking", "sampled-mve", "ranks hypotheses")?,
                 p.part::<BoxedScore>("score", "mve", "compares poses")?,
@@ -119,15 +122,20 @@ pub(super) fn add(catalog: &mut Catalog) {
             ),
             search_options(p)?,
         );
-        // The local stage runs from the initial pose and from the best hypotheses.
-        let local = p.iterations_of("stage").fold(0, u64::max).saturating_mul(3);
-        let explore = p.iterations_of("explore").fold(0, u64::max);
-        let explored = explore.saturating_mul(search.options.refined as u64);
-        let align = p.iterations_of("align").fold(0, u64::max);
-        let aligned = align.saturating_mul(search.options.aligned as u64);
-        let total = local.saturating_add(search.options.hypotheses as u64);
-        let total = total.saturating_add(aligned);
-        p.takes("refined", total.saturating_add(explored))?;
+        // The local stage runs from the initial pose, and from four at the end.
+        let runs = [
+            ("stage", 5),
+            ("align", search.options.aligned),
+            ("explore", search.options.refined),
+            ("finish", search.options.refined),
+        ];
+        let total = runs
+            .iter()
+            .fold(search.options.hypotheses as u64, |sum, (name, times)| {
+                let most = p.iterations_of(name).fold(0, u64::max);
+                sum.saturating_add(most.saturating_mul(*times as u64))
+            });
+        p.takes("refined", total)?;
         Ok(search)
     });
     catalog.add_stage("color-choice", |p| {
@@ -249,10 +257,10 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
         far_threshold: p.number(
             "far_threshold",
             FACTOR,
-            0.002,
+            0.001,
             "the same if the local pose is far from the initial one",
         )?,
-        good_enough: p.number("good_enough", FACTOR, 0.02, "doubt that ends it")?,
+        good_enough: p.number("good_enough", FACTOR, 0.005, "doubt that ends it")?,
         near_gain: p.number("near_gain", FACTOR, 0.1, near)?,
         far_gain: p.number("far_gain", FACTOR, 0.04, far)?,
         rotations: p.word("rotations", &rotations, tried)?,

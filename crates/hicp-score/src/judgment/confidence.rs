@@ -23,9 +23,9 @@ const LIMIT: f64 = 20.0;
 ///
 /// The model is a network with a few hidden units. Its features are the [`Evidence`], the
 /// [`Misfit`], the score, and the number of poses that look alike. It is fitted on simulated cases
-/// of some 400 invented objects, with imperfect masks, noise, systematic errors of the sensor,
-/// occlusion, look-alikes, walls and wrong classes (`cargo run --release -p hicp-tests --example
-/// confidence -- fit`). A probability is right on average over such cases.
+/// of some 600 invented objects, with imperfect masks, noise, systematic errors of the sensor,
+/// images cut along the mask, occlusion, look-alikes, walls and wrong classes (`cargo run --release
+/// -p hicp-tests --example confidence -- fit`). A probability is right on average over such cases.
 ///
 /// ```
 /// use hicp_score::Confidence;

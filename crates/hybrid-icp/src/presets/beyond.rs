@@ -57,7 +57,9 @@ pub type Explore = Descent<SampledMve>;
 /// The type of [`by_color`].
 pub type ByColor<S> = ColorChoice<S, GatedIcp<Conditioned<Photometric<PointToPlane>>>, MeanVsd>;
 /// The type of [`search`], [`auto`] and [`search_with`].
-pub type Search = HypothesisSearch<Local, Align, Explore, SampledMve, MeanVsd, Doubt>;
+pub type Search = SearchFrom<Local>;
+/// A search that ends with the stage `S`.
+pub type SearchFrom<S> = HypothesisSearch<S, Align, Explore, Fit, SampledMve, MeanVsd, Doubt>;
 
 /// τ_max of projective pairs, as a fraction of the diameter.
 const TAU_DIAMETERS: f32 = 0.25;
@@ -174,6 +176,13 @@ pub(crate) fn fit() -> Fit {
     }
 }
 
+/// Creates the fit of doubtful poses.
+fn wide_fit() -> Fit {
+    let mut wide = fit();
+    wide.association.0.limit = Length::Diameters(WIDE_DIAMETERS);
+    wide
+}
+
 /// Creates a fit that is accepted only if the score improves.
 fn guarded(stage: Fit) -> Guard<Fit, MeanVsd> {
     Guard {
@@ -203,8 +212,7 @@ pub(crate) fn far() -> Far {
 /// symmetric metric. It ends with four iterations of the first stage.
 #[must_use]
 pub fn local() -> Local {
-    let (mut wide, mut short) = (fit(), fit());
-    wide.association.0.limit = Length::Diameters(WIDE_DIAMETERS);
+    let mut short = fit();
     short.stop.1 = IterationLimit(4);
     let steps = SwitchUntilStall {
         score: MeanVsd::imperfect_mask(),
@@ -223,7 +231,7 @@ pub fn local() -> Local {
                 alpha: 0.1,
             },
             aligned: Cascade(()),
-            misaligned: Cascade((guarded(wide), steps)),
+            misaligned: Cascade((guarded(wide_fit()), steps)),
         },
     ))
 }
@@ -257,24 +265,20 @@ fn explore() -> Explore {
 }
 
 /// Creates a search that ends with `stage`.
-fn search_from<S>(
-    stage: S,
-    options: SearchOptions,
-) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd, Doubt> {
+fn search_from<S>(stage: S, options: SearchOptions) -> SearchFrom<S> {
     let scores = (
         SampledMve::imperfect_mask(),
         MeanVsd::imperfect_mask(),
         Doubt,
     );
-    HypothesisSearch::new(stage, align(), explore(), scores, options)
+    let stages = (align(), explore(), wide_fit());
+    HypothesisSearch::new(stage, stages, scores, options)
 }
 
 /// A search without an initial pose that ends with `stage`, as in
 /// [`Refiner::estimate`](crate::Refiner::estimate).
 #[must_use]
-pub fn estimate_with<S>(
-    stage: S,
-) -> HypothesisSearch<S, Align, Explore, SampledMve, MeanVsd, Doubt> {
+pub fn estimate_with<S>(stage: S) -> SearchFrom<S> {
     let options = SearchOptions {
         start: Start::Ignored,
         ..SearchOptions::default()

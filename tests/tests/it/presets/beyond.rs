@@ -413,8 +413,7 @@ fn a_search_without_refined_hypotheses_is_its_local_stage() {
     assert_eq!(refined, local);
     let search = HypothesisSearch::new(
         presets::local(),
-        presets::hybrid(),
-        presets::hybrid(),
+        (presets::hybrid(), presets::hybrid(), presets::hybrid()),
         (
             SampledMve::new(200, 400),
             MeanVsd::default(),

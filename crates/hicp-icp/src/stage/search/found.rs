@@ -6,15 +6,25 @@ use crate::alternative::Alternative;
 use crate::outcome::Outcome;
 use crate::stage::search::distinct::Distinct;
 
-/// A refined pose with its score.
+/// The state of a pose in a search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Progress {
+    /// Explored at low cost, or a look-alike as it is.
+    Explored,
+    /// Fitted by the finishing stage.
+    Fitted,
+    /// Refined by the local stage.
+    Refined,
+}
+
+/// A pose with its score.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Found {
     pub(crate) score: f64,
     pub(crate) outcome: Outcome,
     /// The doubt, once it is known.
     pub(crate) doubt: Option<f64>,
-    /// `true` if the local stage refined it.
-    pub(crate) finished: bool,
+    pub(crate) progress: Progress,
 }
 
 /// The score that outweighs a doubt of 1.
@@ -71,26 +81,37 @@ impl FoundPoses {
         poses.min_by(|a, b| a.cost().total_cmp(&b.cost()))
     }
 
-    /// Adds a pose. Of two poses that are not distinct, the one with the lower score stays.
+    /// Adds a pose. Of two poses that are not distinct, the one with the lower cost stays.
     pub(crate) fn add(&mut self, found: Found, distinct: &Distinct) {
         let pose = found.outcome.camera_from_object;
         let same = |other: &Found| !distinct.apart(&other.outcome.camera_from_object, &pose);
+        let better = |other: &Found| other.cost() <= found.cost() && same(other);
+        if self.poses.iter().any(better) {
+            return;
+        }
+        self.poses.retain(|other| !same(other));
         let place = self
             .poses
             .partition_point(|other| other.score <= found.score);
-        if self.poses[..place].iter().any(same) {
-            return;
-        }
-        self.poses
-            .retain(|other| other.score <= found.score || !same(other));
         self.poses.insert(place, found);
     }
 
-    /// Removes the best pose that the local stage has not refined, up to a gap to the best score.
-    pub(crate) fn next(&mut self, gap: f64) -> Option<Outcome> {
+    /// Removes the best pose that is not fitted, up to a gap to the best score.
+    pub(crate) fn next_to_fit(&mut self, gap: f64) -> Option<Outcome> {
         let limit = self.poses.first()?.score + gap;
-        let unfinished = |found: &Found| !found.finished && found.score <= limit;
-        let next = self.poses.iter().position(unfinished)?;
+        let next = |found: &Found| found.progress == Progress::Explored && found.score <= limit;
+        let next = self.poses.iter().position(next)?;
+        Some(self.poses.remove(next).outcome)
+    }
+
+    /// Removes the cheapest pose that the local stage has not refined, up to a gap to the lowest
+    /// cost.
+    pub(crate) fn next_to_refine(&mut self, gap: f64) -> Option<Outcome> {
+        let limit = self.cheapest()?.cost() + gap;
+        let poses = self.poses.iter().enumerate();
+        let (next, _) = poses
+            .filter(|(_, found)| found.progress < Progress::Refined && found.cost() <= limit)
+            .min_by(|(_, a), (_, b)| a.cost().total_cmp(&b.cost()))?;
         Some(self.poses.remove(next).outcome)
     }
 
@@ -129,7 +150,7 @@ mod tests {
             score,
             outcome: Outcome::kept(&Isometry3::identity(), Termination::Converged),
             doubt: Some(doubt),
-            finished: true,
+            progress: Progress::Refined,
         }
     }
 

@@ -6,7 +6,7 @@ use hicp_score::Score;
 use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::search::distinct::Distinct;
-use crate::stage::search::found::{Found, FoundPoses, LEAST_DOUBT};
+use crate::stage::search::found::{Found, FoundPoses, LEAST_DOUBT, Progress};
 use crate::stage::search::hypotheses::Hypotheses;
 use crate::stage::search::look_alikes::{LookAlikes, nearest_to_initial};
 use crate::stage::search::options::{SearchOptions, Start};
@@ -22,8 +22,8 @@ use crate::stage::stage_trait::Stage;
 /// 2. **Align**: a stage that costs as much as some scores moves each to the image. The best that
 ///    differ are kept. If the local pose is near the initial one, a hypothesis must win by more, so
 ///    only a quarter of the best are aligned and refined.
-/// 3. **Try**: the local stage refines the best of the first 32. If that is good enough, the others
-///    are not aligned, and nothing is explored.
+/// 3. **Try**: the finishing stage fits the best of the first 32. If that is good enough, the
+///    others are not aligned, and nothing is explored.
 /// 4. **Explore**: a stage that costs some hundred scores refines each. If the best pose is still
 ///    bad, and the local pose is far from the initial one, [`SearchOptions::widens`] repeats steps
 ///    2 and 4 for all ranked hypotheses. Twice as many are then refined, and they differ by half as
@@ -33,8 +33,9 @@ use crate::stage::stage_trait::Stage;
 ///    local pose is good, because the score of a rotated mug is good, too. Look-alikes of a good
 ///    pose are also kept as they are. If the image shows enough of what tells the two poses apart,
 ///    it costs only a projection of 256 points.
-/// 6. **Finish**: the local stage refines the two best poses that differ, and up to a third of
-///    `refined` if all stay doubtful. They are compared by score + doubt / 10.
+/// 6. **Finish**: the finishing stage fits the two best poses that differ, and up to `refined` if
+///    all stay doubtful. They are compared by score + doubt / 10, before the fit and after it. Then
+///    the local stage refines the best one, and up to three others within 0.04.
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
 /// [`SearchOptions::far_gain`] if the local pose is far from the initial one. If another pose looks
@@ -50,18 +51,20 @@ use crate::stage::stage_trait::Stage;
 /// pose outside of it is never returned; the initial pose replaces a local pose that is outside.
 ///
 /// Cost: the local stage. If doubt × score is above the threshold, also `hypotheses` × the ranking
-/// score, `aligned` × the aligning stage, `refined` + 8 × the exploring stage, and the local stage
-/// three or four times. If all poses stay doubtful, the local stage runs up to 1/3 `refined` times,
-/// and if the search goes on, it costs about three times as much. The near symmetries of a model
-/// are found once, in some 10 ms.
+/// score, `aligned` × the aligning stage, `refined` + 8 × the exploring stage, three or four times
+/// the finishing stage, and up to four times the local stage. If all poses stay doubtful, the
+/// finishing stage runs up to `refined` times, and if the search goes on, it costs about three
+/// times as much. The near symmetries of a model are found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HypothesisSearch<S, A, E, R, C, D> {
-    /// Refines the initial pose, and the best hypotheses.
+pub struct HypothesisSearch<S, A, E, F, R, C, D> {
+    /// Refines the initial pose, and the pose found.
     pub stage: S,
     /// Moves many hypotheses to the image, at the cost of some scores.
     pub align: A,
     /// Refines the best hypotheses at low cost.
     pub explore: E,
+    /// Fits the poses that may be the right one to all pixels.
+    pub finish: F,
     /// Ranks hypotheses; lower is better.
     pub ranking: R,
     /// Compares poses; lower is better.
@@ -79,13 +82,12 @@ pub struct HypothesisSearch<S, A, E, R, C, D> {
     found: FoundPoses,
 }
 
-impl<S, A, E, R, C, D> HypothesisSearch<S, A, E, R, C, D> {
+impl<S, A, E, F, R, C, D> HypothesisSearch<S, A, E, F, R, C, D> {
     /// Creates the stage.
     #[must_use]
     pub fn new(
         stage: S,
-        align: A,
-        explore: E,
+        (align, explore, finish): (A, E, F),
         (ranking, score, doubt): (R, C, D),
         options: SearchOptions,
     ) -> Self {
@@ -93,6 +95,7 @@ impl<S, A, E, R, C, D> HypothesisSearch<S, A, E, R, C, D> {
             stage,
             align,
             explore,
+            finish,
             ranking,
             score,
             doubt,
@@ -113,22 +116,29 @@ impl<S, A, E, R, C, D> HypothesisSearch<S, A, E, R, C, D> {
     }
 }
 
-impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
-    HypothesisSearch<S, A, E, R, C, D>
+impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
+    HypothesisSearch<S, A, E, F, R, C, D>
 {
     /// Adds a pose to the list of those found, unless it lies outside of the bound.
-    fn add(&mut self, run: &mut Run<'_, '_>, outcome: Outcome, finished: bool) {
+    fn add(&mut self, run: &mut Run<'_, '_>, outcome: Outcome, progress: Progress) {
         let pose = &outcome.camera_from_object;
         if run.allows(pose) {
-            let score = run.score(&mut self.score, pose);
-            let doubt = finished.then(|| run.score(&mut self.doubt, pose));
+            let explored = progress == Progress::Explored;
             let found = Found {
-                score,
+                score: run.score(&mut self.score, pose),
                 outcome,
-                doubt,
-                finished,
+                doubt: (!explored).then(|| run.score(&mut self.doubt, pose)),
+                progress,
             };
             self.found.add(found, &run.distinct);
+        }
+    }
+
+    /// Adds a pose to the list of those found, or its fit if that costs less.
+    fn fit(&mut self, run: &mut Run<'_, '_>, start: Outcome) {
+        let next = run.refine(&mut self.finish, &start.camera_from_object);
+        for outcome in [start, start.then(next)] {
+            self.add(run, outcome, Progress::Fitted);
         }
     }
 
@@ -206,14 +216,13 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
         }
     }
 
-    /// Refines the best aligned pose with the local stage.
+    /// Fits the best aligned pose.
     fn try_best(&mut self, run: &mut Run<'_, '_>) {
         if let Some((_, pose)) = self.aligned.poses().first()
             && !run.is_over()
         {
             let outcome = Outcome::refined(*pose, Termination::Converged);
-            let next = run.refine(&mut self.stage, pose);
-            self.add(run, outcome.then(next), true);
+            self.fit(run, outcome);
         }
     }
 
@@ -255,7 +264,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             let outcome = run.refine(&mut self.explore, start);
             // A hypothesis that the stage keeps is still another pose than the initial one.
             let verdict = Verdict::Refined;
-            self.add(run, Outcome { verdict, ..outcome }, false);
+            self.add(run, Outcome { verdict, ..outcome }, Progress::Explored);
         }
         self.aligned = aligned;
     }
@@ -276,7 +285,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
                     score: *score,
                     outcome: Outcome::refined(*pose, Termination::Converged),
                     doubt: None,
-                    finished: false,
+                    progress: Progress::Explored,
                 };
                 self.found.add(as_it_is, &run.distinct);
             }
@@ -306,29 +315,35 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score>
             score,
             outcome,
             doubt: Some(run.score(&mut self.doubt, &pose)),
-            finished: true,
+            progress: Progress::Refined,
         })
     }
 
-    /// Refines the best of all poses found by the local stage, until one is good enough.
+    /// Fits the best of all poses found, until one is good enough. Then refines that one, and
+    /// others that may be as good.
     fn finish(&mut self, run: &mut Run<'_, '_>) {
-        for finalist in 0..FINALISTS.max(run.options.refined / 3) {
+        for finalist in 0..FINALISTS.max(run.options.refined) {
             let good = |best: Found| best.doubt() <= run.options.good_enough;
             let enough = finalist >= FINALISTS && self.found.cheapest().is_some_and(good);
             if enough || run.is_over() {
-                return;
+                break;
             }
-            let Some(explored) = self.found.next(FINAL_GAP) else {
-                return;
+            let Some(explored) = self.found.next_to_fit(FINAL_GAP) else {
+                break;
             };
-            let next = run.refine(&mut self.stage, &explored.camera_from_object);
-            let allowed = run.allows(&next.camera_from_object);
-            let refined = if allowed {
-                explored.then(next)
-            } else {
-                explored
+            self.fit(run, explored);
+        }
+        for _ in 0..REFINED {
+            if run.is_over() {
+                break;
+            }
+            let Some(fitted) = self.found.next_to_refine(REFINED_GAP) else {
+                break;
             };
-            self.add(run, refined, true);
+            let next = run.refine(&mut self.stage, &fitted.camera_from_object);
+            for outcome in [fitted, fitted.then(next)] {
+                self.add(run, outcome, Progress::Refined);
+            }
         }
     }
 }
@@ -339,15 +354,19 @@ const FIRST: usize = 32;
 const UNEXPLAINED: f64 = 0.002;
 /// Product of doubt and score above which the search of a part of the hypotheses has failed.
 const FAILED: f64 = 0.02;
-/// Number of distinct poses that the local stage refines, even if one is good enough.
+/// Number of distinct poses that are fitted, even if one is good enough.
 const FINALISTS: usize = 2;
 /// Largest gap in score between them and the best one.
 const FINAL_GAP: f64 = 0.1;
+/// Largest number of distinct poses that the local stage refines.
+const REFINED: usize = 4;
+/// Largest gap in cost between them and the best one.
+const REFINED_GAP: f64 = 0.04;
 /// Gap in score that errors of the sensor and the model can explain.
 const UNDECIDED: f64 = 0.02;
 
-impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
-    for HypothesisSearch<S, A, E, R, C, D>
+impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
+    for HypothesisSearch<S, A, E, F, R, C, D>
 {
     fn run(
         &mut self,
@@ -396,7 +415,7 @@ impl<S: Stage, A: Stage, E: Stage, R: Score, C: Score, D: Score> Stage
             (self.options.threshold, self.options.near_gain)
         };
         if !ignored {
-            self.add(&mut run, local, true);
+            self.add(&mut run, local, Progress::Refined);
         }
         let from = self.found.cheapest();
         // No pose can win by the gain if the cost is lower.

@@ -57,8 +57,8 @@ pub struct SearchOptions {
     /// Number of best aligned hypotheses to refine; a quarter if the local pose is near the initial
     /// one.
     ///
-    /// At most eight look-alikes of the best one are refined, and the local stage finishes at most
-    /// a third as many poses.
+    /// At most eight look-alikes of the best one are refined, and the finishing stage fits at most
+    /// as many poses as this.
     pub refined: usize,
     /// The smallest angle between the rotations of refined hypotheses, degrees.
     ///
@@ -85,14 +85,14 @@ impl Default for SearchOptions {
     /// Of these, 256 are aligned, and 24 at least 20° apart are refined. Near the initial pose, it
     /// is a quarter of both.
     ///
-    /// The search starts if doubt × score is above 0.002. A hypothesis must be better by 0.1, or by
-    /// 0.04 if the local pose is far from the initial one.
+    /// The search starts if doubt × score is above 0.002. A hypothesis must be better by 0.1. If
+    /// the local pose is far from the initial one, the numbers are 0.001 and 0.04.
     fn default() -> Self {
         Self {
             start: Start::Refined,
             threshold: 0.002,
-            far_threshold: 0.002,
-            good_enough: 0.02,
+            far_threshold: 0.001,
+            good_enough: 0.005,
             near_gain: 0.1,
             far_gain: 0.04,
             rotations: Rotations::Even,

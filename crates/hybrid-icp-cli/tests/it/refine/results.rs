@@ -203,7 +203,7 @@ fn other_poses_that_a_search_finds_are_written() {
         .with("--alternatives", "others.json")
         .with("--pipeline", "always.toml");
     let always = hybrid_icp::Preset::Search.toml();
-    let limit = "good_enough = 0.02\n";
+    let limit = "good_enough = 0.005\n";
     let always = always.replace(limit, "good_enough = 0.0\nstart = \"ignored\"\n");
     std::fs::write(scene.path("always.toml"), always).unwrap();
     scene.run().exits(0);
