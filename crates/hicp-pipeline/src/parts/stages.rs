@@ -107,7 +107,7 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_stage("hypothesis-search", |p| {
         p.about = "Runs a local stage; where its score stays bad, runs it again from the best of \
             many rotations. Not local. Cost: the stage; where it fails hypotheses × ranking, \
-            aligned × align, refined × explore and up to refined × finish.";
+            aligned × align, refined × explore and up to half as many × finish.";
         let search = HypothesisSearch::new(
             p.part::<BoxedStage>("stage", None, "refines locally")?,
             (
@@ -122,12 +122,15 @@ pub(super) fn add(catalog: &mut Catalog) {
             ),
             search_options(p)?,
         );
-        // The local stage runs from the initial pose, and from four at the end.
+        let SearchOptions {
+            aligned, refined, ..
+        } = search.options;
         let runs = [
-            ("stage", 5),
-            ("align", search.options.aligned),
-            ("explore", search.options.refined),
-            ("finish", search.options.refined),
+            // From the initial pose, and from some at the end.
+            ("stage", 2 + refined / 6),
+            ("align", aligned),
+            ("explore", refined),
+            ("finish", refined / 2),
         ];
         let total = runs
             .iter()

@@ -75,7 +75,7 @@ fn a_count_of_a_billion_is_refused_with_its_field() {
                 "type = \"hypothesis-search\"\nrefined = 1000000000\nstage = {ICP}\nexplore = {ICP}\n"
             ),
             "my.toml:2: refined",
-            "1000000000, up to 51000001506 iterations in all",
+            "1000000000, up to 58833334656 iterations in all",
         ),
     ] {
         assert_eq!(message(&text), format!("{field}: found {found}, {RAISE}"));

@@ -33,9 +33,10 @@ use crate::stage::stage_trait::Stage;
 ///    local pose is good, because the score of a rotated mug is good, too. Look-alikes of a good
 ///    pose are also kept as they are. If the image shows enough of what tells the two poses apart,
 ///    it costs only a projection of 256 points.
-/// 6. **Finish**: the finishing stage fits the two best poses that differ, and up to `refined` if
-///    all stay doubtful. They are compared by score + doubt / 10, before the fit and after it. Then
-///    the local stage refines the best one, and up to three others within 0.04.
+/// 6. **Finish**: the finishing stage fits the two best poses that differ, and up to a half of
+///    `refined` if all stay doubtful. They are compared by score + doubt / 10, before the fit and
+///    after it. Then the local stage refines the best one. If the local pose is far from the
+///    initial one, it also refines up to three others within 0.04.
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
 /// [`SearchOptions::far_gain`] if the local pose is far from the initial one. If another pose looks
@@ -53,7 +54,7 @@ use crate::stage::stage_trait::Stage;
 /// Cost: the local stage. If doubt × score is above the threshold, also `hypotheses` × the ranking
 /// score, `aligned` × the aligning stage, `refined` + 8 × the exploring stage, three or four times
 /// the finishing stage, and up to four times the local stage. If all poses stay doubtful, the
-/// finishing stage runs up to `refined` times, and if the search goes on, it costs about three
+/// finishing stage runs up to `refined` / 2 times, and if the search goes on, it costs about three
 /// times as much. The near symmetries of a model are found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, A, E, F, R, C, D> {
@@ -322,7 +323,8 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
     /// Fits the best of all poses found, until one is good enough. Then refines that one, and
     /// others that may be as good.
     fn finish(&mut self, run: &mut Run<'_, '_>) {
-        for finalist in 0..FINALISTS.max(run.options.refined) {
+        let refined = run.options.refined;
+        for finalist in 0..FINALISTS.max(refined / 2) {
             let good = |best: Found| best.doubt() <= run.options.good_enough;
             let enough = finalist >= FINALISTS && self.found.cheapest().is_some_and(good);
             if enough || run.is_over() {
@@ -333,7 +335,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
             };
             self.fit(run, explored);
         }
-        for _ in 0..REFINED {
+        for _ in 0..(refined / REFINED).max(1) {
             if run.is_over() {
                 break;
             }
@@ -358,8 +360,8 @@ const FAILED: f64 = 0.02;
 const FINALISTS: usize = 2;
 /// Largest gap in score between them and the best one.
 const FINAL_GAP: f64 = 0.1;
-/// Largest number of distinct poses that the local stage refines.
-const REFINED: usize = 4;
+/// Number of refined hypotheses per pose that the local stage refines at the end.
+const REFINED: usize = 6;
 /// Largest gap in cost between them and the best one.
 const REFINED_GAP: f64 = 0.04;
 /// Gap in score that errors of the sensor and the model can explain.

@@ -58,7 +58,7 @@ pub struct SearchOptions {
     /// one.
     ///
     /// At most eight look-alikes of the best one are refined, and the finishing stage fits at most
-    /// as many poses as this.
+    /// half as many poses as this.
     pub refined: usize,
     /// The smallest angle between the rotations of refined hypotheses, degrees.
     ///
