@@ -42,7 +42,7 @@ type Set = [u64; SAMPLES / 64];
 /// object away from the axis. Declared symmetries are left out, and so are motions that differ from
 /// another one only by these.
 ///
-/// Computed once per model, in some 3 ms.
+/// Computed once per model, in some 10 ms.
 #[derive(Debug)]
 pub(crate) struct NearSymmetries {
     samples: Vec<Surfel>,
