@@ -350,7 +350,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
     }
 }
 
-/// Number of best ranked hypotheses that are aligned before the local stage tries the best of them.
+/// Number of best ranked hypotheses that are aligned before the best of them is tried.
 const FIRST: usize = 32;
 /// Product of doubt and score above which even a confident pose is not good enough: a score of .04.
 const UNEXPLAINED: f64 = 0.002;
