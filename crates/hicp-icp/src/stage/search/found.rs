@@ -176,4 +176,30 @@ mod tests {
         };
         assert!(!unknown.beats(&local, 0.1));
     }
+
+    #[test]
+    fn low_scores_are_fitted_first_and_low_costs_refined_first() {
+        let with = |progress, found: Found| Found { progress, ..found };
+        let mut found = FoundPoses {
+            poses: vec![
+                with(Progress::Fitted, found(0.1, 0.9)),
+                with(Progress::Explored, found(0.12, 0.0)),
+                with(Progress::Fitted, found(0.13, 0.1)),
+                with(Progress::Refined, found(0.14, 0.0)),
+            ],
+        };
+        let scores = |found: &FoundPoses| found.poses.iter().map(|f| f.score).collect::<Vec<_>>();
+        // Nothing else is unfitted, and this one only within the gap.
+        assert!(found.next_to_fit(0.01).is_none());
+        assert!(found.next_to_fit(0.03).is_some());
+        assert!(found.next_to_fit(1.0).is_none());
+        assert_eq!(scores(&found), [0.1, 0.13, 0.14]);
+        // The costs are 0.19, 0.14 and 0.14.
+        assert!(found.next_to_refine(0.04).is_some());
+        assert_eq!(scores(&found), [0.1, 0.14]);
+        assert!(found.next_to_refine(0.04).is_none());
+        assert!(found.next_to_refine(0.06).is_some());
+        assert_eq!(scores(&found), [0.14]);
+        assert!(found.next_to_refine(1.0).is_none());
+    }
 }
