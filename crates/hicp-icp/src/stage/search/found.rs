@@ -3,7 +3,7 @@
 use hicp_core::Isometry3;
 
 use crate::alternative::Alternative;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, Termination};
 use crate::stage::search::distinct::Distinct;
 
 /// The state of a pose in a search.
@@ -33,6 +33,16 @@ const DOUBT_WEIGHT: f64 = 0.1;
 pub(crate) const LEAST_DOUBT: f64 = 0.05;
 
 impl Found {
+    /// Creates an explored pose, or a look-alike as it is, whose doubt is not known.
+    pub(crate) fn explored(score: f64, camera_from_object: Isometry3<f64>) -> Self {
+        Self {
+            score,
+            outcome: Outcome::refined(camera_from_object, Termination::Converged),
+            doubt: None,
+            progress: Progress::Explored,
+        }
+    }
+
     /// Returns the doubt; 1 if it is not known.
     pub(crate) fn doubt(&self) -> f64 {
         self.doubt.unwrap_or(1.0)
@@ -97,22 +107,22 @@ impl FoundPoses {
     }
 
     /// Removes the best pose that is not fitted, up to a gap to the best score.
-    pub(crate) fn next_to_fit(&mut self, gap: f64) -> Option<Outcome> {
+    pub(crate) fn next_to_fit(&mut self, gap: f64) -> Option<Found> {
         let limit = self.poses.first()?.score + gap;
         let next = |found: &Found| found.progress == Progress::Explored && found.score <= limit;
         let next = self.poses.iter().position(next)?;
-        Some(self.poses.remove(next).outcome)
+        Some(self.poses.remove(next))
     }
 
     /// Removes the cheapest pose that the local stage has not refined, up to a gap to the lowest
     /// cost.
-    pub(crate) fn next_to_refine(&mut self, gap: f64) -> Option<Outcome> {
+    pub(crate) fn next_to_refine(&mut self, gap: f64) -> Option<Found> {
         let limit = self.cheapest()?.cost() + gap;
         let poses = self.poses.iter().enumerate();
         let (next, _) = poses
             .filter(|(_, found)| found.progress < Progress::Refined && found.cost() <= limit)
             .min_by(|(_, a), (_, b)| a.cost().total_cmp(&b.cost()))?;
-        Some(self.poses.remove(next).outcome)
+        Some(self.poses.remove(next))
     }
 
     /// Lists the poses that differ from the returned one.
@@ -143,7 +153,6 @@ impl FoundPoses {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::outcome::Termination;
 
     fn found(score: f64, doubt: f64) -> Found {
         Found {

@@ -124,23 +124,37 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
     fn add(&mut self, run: &mut Run<'_, '_>, outcome: Outcome, progress: Progress) {
         let pose = &outcome.camera_from_object;
         if run.allows(pose) {
-            let explored = progress == Progress::Explored;
-            let found = Found {
+            let scored = Found {
                 score: run.score(&mut self.score, pose),
                 outcome,
-                doubt: (!explored).then(|| run.score(&mut self.doubt, pose)),
+                doubt: None,
                 progress,
+            };
+            let found = match progress {
+                Progress::Explored => scored,
+                Progress::Fitted | Progress::Refined => self.judged(run, scored, progress),
             };
             self.found.add(found, &run.distinct);
         }
     }
 
-    /// Adds a pose to the list of those found, or its fit if that costs less.
-    fn fit(&mut self, run: &mut Run<'_, '_>, start: Outcome) {
-        let next = run.refine(&mut self.finish, &start.camera_from_object);
-        for outcome in [start, start.then(next)] {
-            self.add(run, outcome, Progress::Fitted);
+    /// Returns a scored pose with its doubt and its progress.
+    fn judged(&mut self, run: &mut Run<'_, '_>, scored: Found, progress: Progress) -> Found {
+        let pose = scored.outcome.camera_from_object;
+        let judge = || run.score(&mut self.doubt, &pose);
+        Found {
+            doubt: Some(scored.doubt.unwrap_or_else(judge)),
+            progress,
+            ..scored
         }
+    }
+
+    /// Adds a pose to the list of those found, or its fit if that costs less.
+    fn fit(&mut self, run: &mut Run<'_, '_>, scored: Found) {
+        let start = self.judged(run, scored, Progress::Fitted);
+        let next = run.refine(&mut self.finish, &start.outcome.camera_from_object);
+        self.found.add(start, &run.distinct);
+        self.add(run, start.outcome.then(next), Progress::Fitted);
     }
 
     /// Returns the doubt in the best pose found, or infinity if there is none.
@@ -219,11 +233,11 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
 
     /// Fits the best aligned pose.
     fn try_best(&mut self, run: &mut Run<'_, '_>) {
-        if let Some((_, pose)) = self.aligned.poses().first()
-            && !run.is_over()
-        {
-            let outcome = Outcome::refined(*pose, Termination::Converged);
-            self.fit(run, outcome);
+        let best = self.aligned.poses().first().copied();
+        let best = best.filter(|(_, pose)| run.allows(pose) && !run.is_over());
+        if let Some((_, pose)) = best {
+            let score = run.score(&mut self.score, &pose);
+            self.fit(run, Found::explored(score, pose));
         }
     }
 
@@ -282,13 +296,8 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         if !bad {
             // A look-alike of a pose that fits may fit as it is.
             for (score, pose) in listed.poses() {
-                let as_it_is = Found {
-                    score: *score,
-                    outcome: Outcome::refined(*pose, Termination::Converged),
-                    doubt: None,
-                    progress: Progress::Explored,
-                };
-                self.found.add(as_it_is, &run.distinct);
+                self.found
+                    .add(Found::explored(*score, *pose), &run.distinct);
             }
         }
         self.aligned.clear();
@@ -342,10 +351,10 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
             let Some(fitted) = self.found.next_to_refine(REFINED_GAP) else {
                 break;
             };
-            let next = run.refine(&mut self.stage, &fitted.camera_from_object);
-            for outcome in [fitted, fitted.then(next)] {
-                self.add(run, outcome, Progress::Refined);
-            }
+            let start = self.judged(run, fitted, Progress::Refined);
+            let next = run.refine(&mut self.stage, &start.outcome.camera_from_object);
+            self.found.add(start, &run.distinct);
+            self.add(run, start.outcome.then(next), Progress::Refined);
         }
     }
 }
