@@ -231,11 +231,12 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         }
     }
 
-    /// Fits the best aligned pose.
+    /// Fits the best aligned pose within the bound.
     fn try_best(&mut self, run: &mut Run<'_, '_>) {
-        let best = self.aligned.poses().first().copied();
-        let best = best.filter(|(_, pose)| run.allows(pose) && !run.is_over());
-        if let Some((_, pose)) = best {
+        let mut poses = self.aligned.poses().iter().map(|(_, pose)| *pose);
+        if let Some(pose) = poses.find(|pose| run.allows(pose))
+            && !run.is_over()
+        {
             let score = run.score(&mut self.score, &pose);
             self.fit(run, Found::explored(score, pose));
         }
