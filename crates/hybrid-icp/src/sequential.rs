@@ -5,7 +5,9 @@ use hicp_fusion::{
     BoxedFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
     Gated, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance,
 };
-use hicp_icp::{BoxedStage, Observer, Outcome, Quality, Session, Stage, Workspace};
+use hicp_icp::{
+    BoxedStage, Observer, Outcome, Quality, Session, Stage, Termination, Verdict, Workspace,
+};
 use hicp_raster::Rasterizer;
 use hicp_score::{MeanVsd, Score};
 
@@ -252,7 +254,10 @@ impl SequentialEstimator {
 
     /// Scores the outcome of ICP and passes it to the fuser.
     fn take(&mut self, problem: &Problem<'_>, outcome: &Outcome) -> (Option<f64>, SequentialEvent) {
-        if outcome.evaluation.is_none() && self.config.without_pairs == WithoutPairs::Nothing {
+        // A guard keeps a good initial pose, and a search returns one, without pairs.
+        let guarded = outcome.termination == Termination::ScoreNotImproved;
+        let found = outcome.evaluation.is_some() || outcome.verdict == Verdict::Refined || guarded;
+        if !found && self.config.without_pairs == WithoutPairs::Nothing {
             return (None, SequentialEvent::NoEstimate(outcome.termination));
         }
         let pose = &outcome.camera_from_object;

@@ -52,7 +52,10 @@ impl Default for SequentialConfig {
 pub enum SequentialEvent {
     /// There was an estimate, and the fuser returned this.
     Estimated(Update),
-    /// ICP found no pair, for instance because nothing was seen. The fused pose stays.
+    /// ICP found no pose and kept its initial one, for instance because nothing was seen. The fused
+    /// pose stays.
+    ///
+    /// A pose that is kept because no other one has a better score is an estimate.
     NoEstimate(Termination),
     /// The estimate or its covariance was refused. The fused pose stays.
     Refused(FusionError),

@@ -126,16 +126,41 @@ fn fusing_is_better_than_the_last_estimate_where_the_noise_is_large() {
 }
 
 #[test]
+fn a_pose_that_a_preset_keeps_is_an_estimate() {
+    let path = path(Household::Mug, 4, 0.3, 3);
+    for preset in [Preset::Local, Preset::Search, Preset::Auto, Preset::Color] {
+        let mut estimator = SequentialEstimator::for_object(
+            preset.build(),
+            FusionMethod::WeightedAverage,
+            &path.model,
+            &path.frames[0].1,
+        )
+        .expect("valid");
+        for (observation, _, motion) in &path.frames {
+            let step = estimator.step(&path.model, observation, motion);
+            assert!(
+                matches!(step.event, SequentialEvent::Estimated(_)),
+                "{preset}: {:?}",
+                step.event
+            );
+            assert!(step.mve.is_some_and(|mve| mve < 0.1), "{step:?}");
+        }
+    }
+}
+
+#[test]
 fn an_empty_image_gives_no_estimate() {
+    for preset in [Preset::Hybrid, Preset::Local, Preset::Auto] {
+        an_empty_image_gives_no_estimate_of(preset);
+    }
+}
+
+fn an_empty_image_gives_no_estimate_of(preset: Preset) {
     let path = path(Household::Mug, 2, 0.3, 3);
     let (observation, truth, _) = &path.frames[0];
-    let mut estimator = SequentialEstimator::for_object(
-        Preset::Hybrid.build(),
-        FusionMethod::Average,
-        &path.model,
-        truth,
-    )
-    .expect("valid");
+    let mut estimator =
+        SequentialEstimator::for_object(preset.build(), FusionMethod::Average, &path.model, truth)
+            .expect("valid");
     let motion = path.frames[1].2;
     let step = estimator.step(&path.model, &nothing_seen(), &motion);
     assert!(
