@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_4;
 
-use hicp_core::{Isometry3, Model, Observation, diameter};
+use hicp_core::{Isometry3, Model, Observation, diameter, se3};
 use hicp_icp::Alternative;
 use hicp_score::Flatness;
 use hicp_switch::PAPER_ALPHA;
@@ -63,7 +63,12 @@ const DIAMETER_TOLERANCE: f64 = 0.05;
 pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Vec<Warning> {
     let mut warnings = warnings_of_model(model);
     let diameter = model.diameter();
-    let distance = (init * model.center()).z;
+    let rigid = se3::is_finite(init) && (init.rotation.norm() - 1.0).abs() < 1e-6;
+    let distance = if rigid {
+        (init * model.center()).z
+    } else {
+        f64::NAN
+    };
     let (pixels, median) = inside_mask(observation);
     match warning_of_distance(distance, median) {
         Some(warning @ Warning::BehindCamera { .. }) => {
@@ -143,6 +148,9 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
     if !PLAUSIBLE_DIAMETERS_METERS.contains(&diameter) {
         warnings.push(Warning::Diameter { diameter });
     }
+    if !model.has_possible_diameter() {
+        warnings.extend(warning_of_diameter(model));
+    }
     let step = model.mesh().coordinate_step();
     if step > COARSE * diameter {
         warnings.push(Warning::CoarseCoordinates { step, diameter });
@@ -154,9 +162,9 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
 /// that of its mesh.
 ///
 /// The stated diameter is [`ModelConfig::diameter`](hicp_core::ModelConfig::diameter). A dataset's
-/// file can be wrong or belong to other models; all lengths in diameters are then wrong.
-/// [`warnings_of_model`] does not include this check, because it costs about O(n log n) of the
-/// vertices: call it once per model.
+/// file can be wrong or belong to other models; all lengths in diameters are then wrong. Costs about
+/// O(n log n) of the vertices: call it once per model. [`warnings_of_model`] includes only the
+/// diameters that no mesh of that radius has.
 ///
 /// ```
 /// use hybrid_icp::{core::*, score::Flatness, *};

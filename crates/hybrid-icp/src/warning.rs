@@ -40,10 +40,11 @@ pub enum Warning {
         /// Diameter of the model.
         diameter: f64,
     },
-    /// The object is behind the camera at the initial pose, or the pose is not finite.
+    /// The object is behind the camera at the initial pose. The pose may also be invalid: not
+    /// finite, or with a quaternion that is not of length 1.
     #[error("the object's center is at z = {}, behind the camera, which looks along +z", Meters(*z))]
     BehindCamera {
-        /// z of the center of the object in the camera frame.
+        /// z of the center of the object in the camera frame; NaN if the pose is invalid.
         z: f64,
     },
     /// There is a mask, but no depth inside.

@@ -4,8 +4,9 @@
 
 use hicp_io::pose_from_bop;
 use hicp_sim::{Household, RelativeGaussian, rng};
-use hicp_tests::OBJECTS;
 use hicp_tests::starts::starts;
+use hicp_tests::{OBJECTS, render};
+use hybrid_icp::core::nalgebra::{Quaternion, UnitQuaternion};
 use hybrid_icp::core::{
     CameraError, DepthImage, Isometry3, Mask, Matrix3, Model, ModelConfig, Observation,
     PinholeCamera, Point3, TriMesh,
@@ -16,7 +17,7 @@ use hybrid_icp::score::Flatness;
 use hybrid_icp::switch::PAPER_ALPHA;
 use hybrid_icp::{
     ACCEPTED, Preset, Refinement, Refiner, Warning, warning_of_diameter, warnings,
-    warnings_of_result,
+    warnings_of_model, warnings_of_result,
 };
 
 const BAD: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
@@ -291,6 +292,57 @@ fn a_stated_diameter_that_differs_from_the_mesh_causes_a_warning() {
     }
 }
 
+/// With a wrong diameter or unit, every tolerance is wrong, so nothing can be trusted.
+#[test]
+fn no_pose_is_trusted_if_the_diameter_is_impossible_or_far_above_the_distance() {
+    let model = Household::Iron.model().unwrap();
+    let truth = hicp_sim::object_pose(&mut rng(5), &model.center(), 0.55..0.6, 0.02);
+    let (depth, mask) = render(&model, &camera(), &truth);
+    let observation = Observation::new(depth, mask, camera()).unwrap();
+    let refined = |model: &Model| Refiner::preset(Preset::Auto).refine(model, &observation, &truth);
+    assert!(refined(&model).confidence > ACCEPTED);
+    let stated = |factor: f64| {
+        let diameter = Some(factor * model.diameter());
+        let config = ModelConfig {
+            diameter,
+            ..ModelConfig::default()
+        };
+        Model::with_config(model.mesh().clone(), config)
+    };
+    assert!(refined(&stated(1.04)).confidence > ACCEPTED);
+    assert_eq!(warnings_of_model(&stated(1.04)), []);
+    for factor in [0.3, 3.0, 1000.0] {
+        let model = stated(factor);
+        assert_eq!(refined(&model).confidence, 0.0, "{factor}");
+        let warnings = warnings_of_model(&model);
+        let about_it = |w: &Warning| matches!(w, Warning::StatedDiameter { .. });
+        assert!(warnings.iter().any(about_it), "{factor}: {warnings:?}");
+    }
+    // A mesh in millimeters that was read as meters.
+    let vertices = model.mesh().vertices().iter().map(|p| p * 1000.0).collect();
+    let mesh = TriMesh::new(vertices, model.mesh().triangles().to_vec()).unwrap();
+    assert_eq!(refined(&Model::new(mesh)).confidence, 0.0);
+}
+
+#[test]
+fn a_pose_that_is_not_rigid_causes_a_warning() {
+    let model = Model::new(cuboid([0.1, 0.06, 0.04]));
+    let depth = DepthImage::from_meters(160, 120, vec![0.5; 160 * 120]).unwrap();
+    let observation = Observation::new(depth, Mask::full(160, 120), camera()).unwrap();
+    let mut init = Isometry3::translation(0.0, 0.0, 0.5);
+    let behind = |init: &_| {
+        let warnings = warnings(&model, &observation, init);
+        warnings
+            .iter()
+            .any(|w| matches!(w, Warning::BehindCamera { .. }))
+    };
+    assert!(!behind(&init));
+    for length in [0.0, 2.0, f64::NAN] {
+        init.rotation = UnitQuaternion::new_unchecked(Quaternion::new(length, 0.0, 0.0, 0.0));
+        assert!(behind(&init), "{length}");
+    }
+}
+
 /// Checks the scores above which a result causes a warning.
 #[test]
 fn results_with_bad_scores_cause_a_warning() {
@@ -460,7 +512,8 @@ fn poses_very_far_away_or_not_finite_end_truthfully() {
             let behind = behind
                 .iter()
                 .any(|warning| matches!(warning, Warning::BehindCamera { .. }));
-            assert_eq!(behind, z.is_nan() || z <= 0.0, "{length}");
+            let valid = init.translation.vector.iter().all(|x| x.is_finite());
+            assert_eq!(behind, !valid || z <= 0.0, "{length}");
         }
     }
 }

@@ -128,6 +128,17 @@ impl Model {
         self.radius
     }
 
+    /// Returns whether the diameter can be that of the mesh, up to 5 %.
+    ///
+    /// [`ModelConfig::diameter`] may be in another unit, or of another object. Every share of the
+    /// diameter is then wrong. Cost: O(1). The diameter of a mesh is between 2/√3 and 2 times
+    /// [`Model::radius`].
+    #[must_use]
+    pub fn has_possible_diameter(&self) -> bool {
+        let radii = self.diameter / self.radius;
+        (0.95 * 2.0 / f64::sqrt(3.0)..=1.05 * 2.0).contains(&radii)
+    }
+
     /// The declared symmetries.
     #[must_use]
     pub fn symmetries(&self) -> &Symmetries {

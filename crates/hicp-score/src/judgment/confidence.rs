@@ -13,6 +13,8 @@ const FINEST: f64 = 0.002;
 /// Number of pixels from which on more make a pose no more certain. The images of the fit hardly
 /// show larger objects.
 const MOST_PIXELS: f64 = 22_000.0;
+/// Least distance of the object, in diameters. Surfaces that are nearer agree with every pose.
+const NEAREST: f64 = 0.1;
 /// Largest magnitude of a feature.
 const LIMIT: f64 = 20.0;
 
@@ -69,7 +71,9 @@ impl Confidence {
     /// the image as well and nothing is known of the initial pose. With 0, no other pose is
     /// considered.
     ///
-    /// Without a model, an image or a rendered pixel, the probability is 0. Cost: one render
+    /// Without a model, an image or a rendered pixel, the probability is 0. It also is 0 if the
+    /// model's diameter is impossible, or more than ten times the distance of the surface, because
+    /// the evidence is measured in diameters. Cost: one render
     /// (shared with other components that use this pose) and about 40 µs. Allocates nothing.
     #[must_use]
     pub fn at(
@@ -79,7 +83,7 @@ impl Confidence {
         look_alikes: f64,
     ) -> (Evidence, Self) {
         let diameter = context.problem.model().map_or(0.0, |m| m.diameter());
-        let (Some((_, observation)), Some(view)) =
+        let (Some((model, observation)), Some(view)) =
             (context.problem.sides(), context.view(camera_from_object))
         else {
             return (Evidence::default(), Self::none(diameter));
@@ -88,7 +92,8 @@ impl Confidence {
         grid.compare(observation, view);
         find_insides(&mut grid);
         let evidence = Evidence::of(&grid);
-        let confidence = if evidence.agrees > 0.0 {
+        let judged = model.has_possible_diameter() && grid.distance() >= NEAREST * diameter;
+        let confidence = if judged && evidence.agrees > 0.0 {
             let features = Self::features(&evidence, &Misfit::of(&grid), mve, look_alikes);
             Self::of(&features, diameter)
         } else {

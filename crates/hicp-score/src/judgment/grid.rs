@@ -175,6 +175,16 @@ impl Grid {
         self.n_measured as f64
     }
 
+    /// Returns the mean depth of the agreeing cells, meters; 0 if there are none.
+    pub(crate) fn distance(&self) -> f64 {
+        let agreeing = self.rendered.iter();
+        let agreeing = agreeing.filter(|index| self.cells[*index] == Cell::Agrees);
+        let (sum, count) = agreeing.fold((0.0, 0.0), |(sum, count), index| {
+            (sum + f64::from(self.measured[index]), count + 1.0)
+        });
+        sum / f64::max(count, 1.0)
+    }
+
     /// Returns the distance between cells, pixels.
     pub(crate) fn step(&self) -> usize {
         self.step

@@ -21,7 +21,11 @@ pub(super) fn about_models(models: &Models, folder: &ModelFolder) {
         diameter.into_iter().for_each(warn);
         for warning in warnings_of_model(model) {
             // One warning about the same number is enough.
-            if diameter.is_none() || !matches!(warning, Warning::Diameter { .. }) {
+            let same = matches!(
+                warning,
+                Warning::Diameter { .. } | Warning::StatedDiameter { .. }
+            );
+            if diameter.is_none() || !same {
                 warn(format_args!(
                     "object {obj_id}: {warning}: check that {} is in mm",
                     folder.dir().display()
