@@ -6,19 +6,26 @@ use hicp_association::{
     AllSamples, MaxDistance, NearestNeighbor, SearchIndex, Stride, estimate_normals,
     voxel_downsample,
 };
-use hicp_core::internal::nearest_name;
+use hicp_core::internal::{coordinate_step, nearest_name};
 use hicp_core::{
     Cloud, Isometry3, Matrix6, Point3, Problem, Source, Surfel, Target, UnitVector3, Vector3,
 };
 use hicp_icp::{
-    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, SmallMotion, Stage, Workspace,
+    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, SmallMotion, Stage, Termination,
+    Workspace,
 };
 use hicp_metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
 use hicp_raster::Rasterizer;
 use thiserror::Error;
 
+use crate::checks::COARSE;
+
 /// Share of the source points with a counterpart below which a warning follows.
 const LITTLE_OVERLAP: f64 = 0.3;
+
+/// Information of a direction, relative to the best determined one, below which only noise
+/// determines it.
+const UNDETERMINED: f64 = 0.01;
 
 /// Gates of a registration without a stated one, as shares of the source's diameter.
 const GATES: [f32; 2] = [0.1, 0.02];
@@ -244,6 +251,23 @@ pub enum CloudWarning {
         /// Number of neighbors.
         neighbors: usize,
     },
+    /// The normals that the error needs are absent, so the pose cannot be determined.
+    #[error("{side}: there are no normals, but the error needs them")]
+    NoNormals {
+        /// The cloud.
+        side: CloudSide,
+    },
+    /// The points are so far from their origin that `f32` rounds their shape.
+    #[error(
+        "{side}: coordinates are rounded to {} mm so far from the origin: subtract an offset first",
+        step * 1e3
+    )]
+    CoarseCoordinates {
+        /// The cloud.
+        side: CloudSide,
+        /// Distance between adjacent numbers at the largest coordinate, meters.
+        step: f64,
+    },
     /// A part of the pipeline needs a mesh or a depth image.
     #[error(
         "the part `{part}` of the pipeline needs a mesh and a depth image, not point clouds: the initial pose was kept"
@@ -261,7 +285,10 @@ pub enum CloudWarning {
         /// Share of the source points with a counterpart.
         fitness: f64,
     },
-    /// The pairs do not determine all six directions, as on a plane or a cylinder.
+    /// The pairs do not determine all six directions, as on a plane or a sphere.
+    ///
+    /// A direction that is left open can look determined: the rotation of a can by the noise of its
+    /// normals, and a shift along a plane by the error of [`PointToPoint`].
     #[error("the clouds do not determine every direction of the pose")]
     Undetermined,
 }
@@ -303,9 +330,9 @@ impl Alignment {
     /// `None` if a direction is not determined.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
-        self.outcome
-            .quality
-            .and_then(|quality| quality.covariance())
+        let quality = self.outcome.quality.as_ref()?;
+        let determined = quality.observability()?.n_degenerate(UNDETERMINED) == 0;
+        quality.covariance().filter(|_| determined)
     }
 }
 
@@ -315,6 +342,9 @@ impl Alignment {
 /// [`Observation`](hicp_core::Observation). The pipeline is a [`Registration`] or any stage. If a
 /// part of it needs an image or a mesh that is absent, the outcome keeps the initial pose and names
 /// the part. Never fails on data: without overlap, the outcome states that no pairs were found.
+///
+/// For a depth image, use [`Refiner`](crate::Refiner): here the fitness of a model also counts the
+/// side that the camera cannot see, and a registration can end at a wrong pose without a warning.
 ///
 /// ```
 /// use hybrid_icp::core::{Isometry3, Point3};
@@ -344,24 +374,36 @@ pub fn align<'a>(
     let mut observer = ();
     let mut session = Session::new(&mut workspace, &mut observer);
     let outcome = pipeline.run(&Problem::new(source, target), init, &mut session);
-    let mut warnings = Vec::new();
+    let mut clouds = Vec::new();
     if let Source::Cloud(cloud) = source {
-        warnings.extend(warnings_of(CloudSide::Source, cloud));
+        clouds.push((CloudSide::Source, cloud));
     }
     if let Target::Cloud(cloud) = target {
-        warnings.extend(warnings_of(CloudSide::Target, cloud));
+        clouds.push((CloudSide::Target, cloud));
     }
-    let mut alignment = Alignment { outcome, warnings };
+    let prepared = clouds
+        .iter()
+        .flat_map(|(side, cloud)| warnings_of(*side, cloud));
+    let mut alignment = Alignment {
+        outcome,
+        warnings: prepared.collect(),
+    };
     let fitness = alignment.fitness();
-    if let Some(part) = outcome.termination.unsupported_part() {
-        alignment.warnings.push(CloudWarning::Unsupported { part });
+    let degenerate = outcome.termination == Termination::Degenerate;
+    let bare = clouds
+        .iter()
+        .rfind(|(_, cloud)| cloud.normals_from() == Some(0));
+    let reason = if let Some(part) = outcome.termination.unsupported_part() {
+        Some(CloudWarning::Unsupported { part })
+    } else if let Some((side, _)) = bare.filter(|_| degenerate) {
+        Some(CloudWarning::NoNormals { side: *side })
     } else if fitness < LITTLE_OVERLAP {
-        alignment
-            .warnings
-            .push(CloudWarning::LittleOverlap { fitness });
-    } else if alignment.covariance().is_none() {
-        alignment.warnings.push(CloudWarning::Undetermined);
-    }
+        Some(CloudWarning::LittleOverlap { fitness })
+    } else {
+        let open = alignment.covariance().is_none();
+        open.then_some(CloudWarning::Undetermined)
+    };
+    alignment.warnings.extend(reason);
     alignment
 }
 
@@ -371,5 +413,12 @@ fn warnings_of(side: CloudSide, cloud: &Cloud) -> impl Iterator<Item = CloudWarn
     let skipped = (count > 0).then_some(CloudWarning::PointsSkipped { side, count });
     let estimated = cloud.normals_from().filter(|neighbors| *neighbors > 0);
     let estimated = estimated.map(|neighbors| CloudWarning::NormalsEstimated { side, neighbors });
-    skipped.into_iter().chain(estimated)
+    let points = cloud.surfels().iter().map(|surfel| surfel.point);
+    let step = coordinate_step(points.clone());
+    let corners = points
+        .map(|p| (p, p))
+        .reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)));
+    let coarse = corners.is_some_and(|(low, high)| step > COARSE * f64::from((high - low).amax()));
+    let coarse = coarse.then_some(CloudWarning::CoarseCoordinates { side, step });
+    skipped.into_iter().chain(estimated).chain(coarse)
 }

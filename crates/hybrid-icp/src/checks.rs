@@ -13,7 +13,7 @@ use crate::warning::Warning;
 const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
 
 /// Share of the diameter that rounding the coordinates may cost.
-const COARSE: f64 = 1e-3;
+pub(crate) const COARSE: f64 = 1e-3;
 
 /// Largest factor between the measured depth and that of the initial pose.
 const DEPTH_RATIO: f64 = 3.0;
@@ -162,9 +162,9 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
 /// that of its mesh.
 ///
 /// The stated diameter is [`ModelConfig::diameter`](hicp_core::ModelConfig::diameter). A dataset's
-/// file can be wrong or belong to other models; all lengths in diameters are then wrong. Costs about
-/// O(n log n) of the vertices: call it once per model. [`warnings_of_model`] includes only the
-/// diameters that no mesh of that radius has.
+/// file can be wrong or belong to other models; all lengths in diameters are then wrong. It costs
+/// about O(n log n) of the vertices, so call it once per model. [`warnings_of_model`] includes only
+/// the diameters that no mesh of that radius has.
 ///
 /// ```
 /// use hybrid_icp::{core::*, score::Flatness, *};

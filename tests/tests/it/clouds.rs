@@ -1,6 +1,6 @@
 //! Registration of point clouds: recovery, equivariance, hostile input, parts that need an image.
 
-use hicp_sim::Household;
+use hicp_sim::{Household, rng, rotation};
 use hybrid_icp::association::{
     AllSamples, BoundaryTargets, Length, MaxDistance, NearestNeighbor, Projective, Reciprocal,
     VisibleSurface, VoxelGrid, estimate_normals, voxel_downsample,
@@ -11,8 +11,9 @@ use hybrid_icp::core::{
 use hybrid_icp::icp::{Guard, Icp, IterationLimit, SmallMotion, Stage, Termination};
 use hybrid_icp::metric::PointToPlane;
 use hybrid_icp::score::MeanVsd;
-use hybrid_icp::{Alignment, CloudOptions, CloudWarning, Preset, Registration, align};
+use hybrid_icp::{Alignment, CloudOptions, CloudSide, CloudWarning, Preset, Registration, align};
 use proptest::prelude::*;
+use rand::RngExt;
 
 fn mug() -> Model {
     Household::Mug.model().unwrap()
@@ -107,6 +108,46 @@ fn hostile_clouds_end_in_an_honest_outcome() {
     with_nan.extend(nan);
     let cloud = cloud(&with_nan);
     assert_eq!((cloud.surfels().len(), cloud.n_skipped()), (1000, 3));
+}
+
+/// Two scans in coordinates of a map, of which one is moved by less than `f32` resolves there.
+#[test]
+fn clouds_far_from_their_origin_cause_a_warning() {
+    let offset = Isometry3::translation(500_000.0, 5_000_000.0, 0.0);
+    // As large as a house.
+    let near: Vec<_> = points(1000).iter().map(|point| point * 100.0).collect();
+    let far = moved(&near, &offset);
+    let coarse = |points: &[Point3<f32>]| {
+        let found = &registered(&cloud(points), &cloud(points), &Isometry3::identity())[0];
+        let coarse = |w: &&CloudWarning| matches!(w, CloudWarning::CoarseCoordinates { .. });
+        found.warnings.iter().filter(coarse).count()
+    };
+    assert_eq!((coarse(&near), coarse(&far)), (0, 2));
+}
+
+/// Two spheres determine no rotation. Noise makes it look as if they did.
+#[test]
+fn spheres_have_no_covariance() {
+    let sphere = |seed: u64| {
+        let mut random = rng(seed);
+        let point = |_| {
+            let radius = 0.1 + 0.0005 * (random.random::<f64>() - 0.5);
+            let direction = rotation(&mut random) * Vector3::z();
+            Point3::from((direction * radius).cast::<f32>())
+        };
+        cloud(&(0..3000).map(point).collect::<Vec<_>>())
+    };
+    let (source, target) = (sphere(1), sphere(2));
+    for kind in [Registration::PointToPlane, Registration::Generalized] {
+        let found = align(
+            &source,
+            &target,
+            &Isometry3::identity(),
+            &mut *kind.build(None),
+        );
+        assert!(found.covariance().is_none(), "{kind:?}");
+        assert_eq!(found.warnings.last(), Some(&CloudWarning::Undetermined));
+    }
 }
 
 #[test]
@@ -294,6 +335,9 @@ fn absent_normals_of_the_source_are_never_used() {
         let without = Cloud::without_normals(points(2000));
         if kind == Registration::Generalized {
             assert_eq!(found(&without).target_from_source(), init);
+            let side = CloudSide::Source;
+            let last = found(&without).warnings.pop();
+            assert_eq!(last, Some(CloudWarning::NoNormals { side }));
         } else {
             assert_eq!(found(&full).outcome, found(&without).outcome);
         }

@@ -21,3 +21,5 @@ pub use suggest::nearest_name;
 pub use vectorized::{VectorLoop, stored, vectorized};
 pub use whole::whole;
 pub use work::Work;
+
+pub use crate::object::mesh::coordinate_step;
