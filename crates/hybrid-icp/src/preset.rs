@@ -75,11 +75,11 @@ declare! {
     HybridVisible, "hybrid-visible", hybrid_visible,
         "Hybrid ICP with visible points for nearest neighbors too, gates and the symmetric metric";
     Local, "local", local,
-        "local refinement that never raises the MVE: fits surface and silhouette, and tries other pairs in doubt";
+        "local refinement that never raises its score (an MVE for imperfect masks): fits surface and silhouette, and tries other pairs in doubt";
     Search, "search", search,
-        "global: local, and if doubt × score is above 0.002 a search over 1000 rotations; may end at an equivalent pose";
+        "global: local, and if doubt × score is above 0.002 a search over 1000 rotations, or above 0.001 far from the initial pose; may end at an equivalent pose";
     Auto, "auto", auto,
-        "global where needed: local, and if doubt × score is above 0.03 a search over 1000 rotations, or above 0.002 far from the initial pose";
+        "global where needed: local, and if doubt × score is above 0.03 a search over 1000 rotations, or above 0.001 far from the initial pose";
     Color, "color", color,
         "global where needed: auto, and color decides among poses that depth cannot tell apart";
 }
