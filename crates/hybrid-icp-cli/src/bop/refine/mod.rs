@@ -66,8 +66,8 @@ enum MaskKind {
     /// The visible masks of the ground truth (mask_visib).
     Visible,
     /// No segmentation: a row uses all depth inside the model's bounding box at its pose. The box
-    /// is enlarged by a twentieth of the diameter. Use it with a projective pipeline, such as
-    /// projective-cascade-plane-point.
+    /// is enlarged by a twentieth of the diameter. From rough poses, use it with auto. From good
+    /// ones, use projective-cascade-plane-point.
     None,
 }
 
