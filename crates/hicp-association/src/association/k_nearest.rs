@@ -15,8 +15,9 @@ use crate::stride::Stride;
 /// It is the soft counterpart of `NearestNeighbor`, after the multiple matches of Granger & Pennec
 /// (2002). The k matches average out part of the noise of single ones, but add a bias toward the
 /// middle of the neighborhood. A model point has a total weight of 1, even if fewer than k points
-/// were observed. Pairs of one point are in order of distance, and those of equal distance in the
-/// order of the image.
+/// were observed. Pairs of one point are adjacent and in order of distance, and those of equal
+/// distance in the order of the image. So another association can run this one and choose among the
+/// pairs of each point.
 ///
 /// Cost: O(n log n) once per observation, then at most O(log n + k²) per point, since k is meant to
 /// be small.
