@@ -91,6 +91,13 @@ impl<'a> Session<'a> {
             cascade_init: None,
         }
     }
+
+    /// Returns a problem as components receive it, with the initial pose of the running cascade.
+    pub fn context<'b>(&'b mut self, problem: &Problem<'b>) -> Context<'b> {
+        self.workspace
+            .context(problem)
+            .in_cascade(self.cascade_init)
+    }
 }
 
 impl std::fmt::Debug for Session<'_> {

@@ -29,9 +29,7 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for Switch<W, A, M> {
         if let Some(part) = self.switcher.unsupported(problem) {
             return Outcome::kept(init, Termination::Unsupported(part));
         }
-        let event = self
-            .switcher
-            .regime(&mut session.workspace.context(problem), init);
+        let event = self.switcher.regime(&mut session.context(problem), init);
         session.observer.on_regime(&event);
         if event.regime == Regime::ALIGNED {
             self.aligned.run(problem, init, session)
@@ -67,9 +65,7 @@ impl<W: Switcher, S: Stage> Stage for SwitchAmong<W, S> {
         if let Some(part) = self.switcher.unsupported(problem) {
             return Outcome::kept(init, Termination::Unsupported(part));
         }
-        let event = self
-            .switcher
-            .regime(&mut session.workspace.context(problem), init);
+        let event = self.switcher.regime(&mut session.context(problem), init);
         session.observer.on_regime(&event);
         let last = self.stages.len().saturating_sub(1);
         match self.stages.get_mut(event.regime.0.min(last)) {

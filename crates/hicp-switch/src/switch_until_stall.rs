@@ -44,7 +44,7 @@ impl<C: Score, A: Stage, M: Stage> Stage for SwitchUntilStall<C, A, M> {
             return Outcome::kept(init, Termination::Unsupported(part));
         }
         let mut judge = |pose: &Isometry3<f64>, session: &mut Session<'_>| {
-            let mut context = session.workspace.context(problem);
+            let mut context = session.context(problem);
             self.score.score(&mut context, pose)
         };
         let mut score = judge(init, session);

@@ -27,7 +27,7 @@ impl<S: Stage> Stage for AlongTheRay<S> {
         session: &mut Session<'_>,
     ) -> Outcome {
         let mve = |session: &mut Session<'_>, outcome: &Outcome| {
-            let mut context = session.workspace.context(problem);
+            let mut context = session.context(problem);
             MeanVsd::default().score(&mut context, &outcome.camera_from_object)
         };
         let mut best = self.stage.run(problem, init, session);

@@ -126,14 +126,16 @@ pub mod prelude {
         AllSamples, MaxDistance, MaxNormalAngle, NearestNeighbor, Projective, VisibleSurface,
     };
     pub use hicp_core::{
-        DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Problem, TriMesh,
-        Vector3,
+        DepthImage, Isometry3, Mask, Model, Observation, Pair, PinholeCamera, Point3, Problem,
+        TriMesh, Vector3,
     };
     pub use hicp_icp::{
-        Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat, SmallMotion, Stage,
-        Termination, Verdict,
+        Cascade, Convergence, Divergence, Icp, IterationLimit, Outcome, Repeat, Session,
+        SmallMotion, Stage, Termination, Verdict,
     };
-    pub use hicp_metric::{ErrorMetric, Kernel, PointToPlane, PointToPoint, Robust};
+    pub use hicp_metric::{
+        ErrorMetric, Kernel, NormalEquations, PointToPlane, PointToPoint, Robust, Scale,
+    };
     pub use hicp_score::{MeanVsd, Score};
     pub use hicp_switch::{Switch, Threshold};
 }

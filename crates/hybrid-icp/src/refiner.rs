@@ -2,7 +2,8 @@
 
 use hicp_core::{Isometry3, Model, Observation, Problem, Renderer};
 use hicp_icp::{
-    Alternative, BoxedStage, LookAlikeCount, Observer, Outcome, Session, Stage, Workspace, is_near,
+    Alternative, BoxedStage, LookAlikeCount, Observer, Outcome, Session, Stage, Termination,
+    Workspace, is_near,
 };
 use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, Evidence, Flatness, MeanVsd, SampledMve, Score};
@@ -182,7 +183,7 @@ impl<S: Stage> Refiner<S> {
             init,
             &mut Session::new(&mut self.workspace, observer),
         );
-        self.judge(&problem, Some((init, mve_initial)), outcome)
+        self.judged(&problem, Some((init, mve_initial)), outcome)
     }
 
     /// Finds the pose of a segmented object (`camera_from_object`, meters) without an initial pose.
@@ -230,11 +231,28 @@ impl<S: Stage> Refiner<S> {
             &Isometry3::identity(),
             &mut Session::new(&mut self.workspace, observer),
         );
-        self.judge(&problem, None, outcome)
+        self.judged(&problem, None, outcome)
+    }
+
+    /// Judges a pose as it is, for example a fused one or that of another library.
+    ///
+    /// It is its own initial pose. The outcome states that it was kept. Cost: one render, and the
+    /// scores of a refinement.
+    pub fn judge(
+        &mut self,
+        model: &Model,
+        observation: &Observation,
+        camera_from_object: &Isometry3<f64>,
+    ) -> Refinement {
+        let problem = Problem::new(model, observation);
+        self.workspace.alternatives_mut().clear();
+        let mve = self.mve(model, observation, camera_from_object);
+        let outcome = Outcome::kept(camera_from_object, Termination::Converged);
+        self.judged(&problem, Some((camera_from_object, mve)), outcome)
     }
 
     /// Scores the pose of an outcome.
-    fn judge(
+    fn judged(
         &mut self,
         problem: &Problem<'_>,
         start: Option<(&Isometry3<f64>, f64)>,

@@ -324,6 +324,24 @@ fn no_pose_is_trusted_if_the_diameter_is_impossible_or_far_above_the_distance() 
     assert_eq!(refined(&Model::new(mesh)).confidence, 0.0);
 }
 
+/// A given pose is judged like a refined one.
+#[test]
+fn a_pose_is_judged_without_a_refinement() {
+    let model = Household::Iron.model().unwrap();
+    let truth = hicp_sim::object_pose(&mut rng(5), &model.center(), 0.55..0.6, 0.02);
+    let (depth, mask) = render(&model, &camera(), &truth);
+    let observation = Observation::new(depth, mask, camera()).unwrap();
+    let mut refiner = Refiner::preset(Preset::Auto);
+    let judged = refiner.judge(&model, &observation, &truth);
+    assert_eq!(judged.outcome.camera_from_object, truth);
+    assert!(matches!(judged.outcome.verdict, Verdict::KeptInitial(_)));
+    assert_eq!((judged.mve, judged.mve_initial), (0.0, 0.0));
+    assert!(judged.confidence > ACCEPTED, "{}", judged.confidence);
+    let wrong = Isometry3::translation(0.05, 0.0, 0.0) * truth;
+    let wrong = refiner.judge(&model, &observation, &wrong);
+    assert!(wrong.mve > 0.3 && wrong.confidence < 0.1, "{wrong:?}");
+}
+
 #[test]
 fn a_pose_that_is_not_rigid_causes_a_warning() {
     let model = Model::new(cuboid([0.1, 0.06, 0.04]));

@@ -59,7 +59,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a data association",
     label = "this must implement `DataAssociation`",
-    note = "`Icp::association` accepts a single `DataAssociation`, such as `Projective` or `NearestNeighbor`"
+    note = "`Icp::association` accepts a `DataAssociation`, such as `Projective`, a pair of two, or a `Vec`"
 )]
 pub trait DataAssociation {
     /// Fills `pairs` at the candidate pose `camera_from_object`.

@@ -138,7 +138,7 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         outcome: Outcome,
         session: &mut Session<'_>,
     ) -> Chosen {
-        let mut context = session.workspace.context(problem);
+        let mut context = session.context(problem);
         let pose = &outcome.camera_from_object;
         Chosen {
             color: self.agreement.measure(&mut context, pose),
@@ -173,9 +173,7 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             ranked = &candidates[..usize::from(first.color.correlation < PERFECT)];
         }
         for pose in ranked {
-            let score = self
-                .color
-                .score(&mut session.workspace.context(problem), pose);
+            let score = self.color.score(&mut session.context(problem), pose);
             insert(&mut self.ranked, (score, *pose), distinct);
         }
         let most = (1.0 + TOLERANCE) * first.score + self.tolerance;
@@ -250,7 +248,7 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
                 let color = match known {
                     Some(known) => known.color,
                     None => {
-                        let mut context = session.workspace.context(problem);
+                        let mut context = session.context(problem);
                         self.agreement.measure(&mut context, other)
                     }
                 };

@@ -63,7 +63,7 @@ impl<C: Score> Stage for Descent<C> {
         let Some((model, _)) = seen else {
             return kept;
         };
-        let mut context = session.workspace.context(problem);
+        let mut context = session.context(problem);
         let mut best = (self.score.score(&mut context, init), *init);
         // A pose that explains nothing, or is not finite, shows no direction.
         if best.0 <= self.good_enough || best.0 >= 1.0 {

@@ -33,7 +33,7 @@ impl<S: Stage, C: Score> Stage for Guard<S, C> {
         if outcome.verdict != Verdict::Refined {
             return outcome;
         }
-        let mut context = session.workspace.context(problem);
+        let mut context = session.context(problem);
         let before = self.score.score(&mut context, init);
         let after = self.score.score(&mut context, &outcome.camera_from_object);
         if after < before {
@@ -75,9 +75,7 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
         if let Some(part) = self.score.unsupported(problem) {
             return Outcome::kept(init, Termination::Unsupported(part));
         }
-        let first = self
-            .score
-            .score(&mut session.workspace.context(problem), init);
+        let first = self.score.score(&mut session.context(problem), init);
         let mut best = (first, Outcome::kept(init, Termination::ScoreNotImproved));
         let mut last = Outcome::kept(init, Termination::IterationLimit);
         for time in 0..self.times {
@@ -89,7 +87,7 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
             if next.verdict != Verdict::Refined {
                 break;
             }
-            let mut context = session.workspace.context(problem);
+            let mut context = session.context(problem);
             let score = self.score.score(&mut context, &last.camera_from_object);
             if score < best.0 {
                 best = (score, last);

@@ -23,7 +23,9 @@
 /// }
 ///
 /// let metric = Robust::new(PointToPlane, StudentT(5.0), Scale::default());
-/// # let _ = metric;
+/// // Or chosen at run time.
+/// let kernel: Box<dyn RobustKernel> = Box::new(StudentT(5.0));
+/// let metric = Robust::new(PointToPlane, kernel, Scale::default());
 /// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a robust kernel",
@@ -39,6 +41,22 @@ pub trait RobustKernel {
     /// Returns the loss ρ(x), with ρ(0) = 0 and ρ(x) ≈ x²/2 near zero.
     fn loss(&self, x: f64) -> f64;
 }
+
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: RobustKernel + ?Sized> RobustKernel for $pointer {
+            fn weight(&self, x: f64) -> f64 {
+                (**self).weight(x)
+            }
+
+            fn loss(&self, x: f64) -> f64 {
+                (**self).loss(x)
+            }
+        }
+    )+};
+}
+
+forward!(Box<T>, &T);
 
 impl RobustKernel for Kernel {
     #[inline]

@@ -2,7 +2,7 @@
 
 use crate::support::{RayCaster, cuboid, depth_image, observe, observe_depth, pose, wedge};
 use hicp_core::{Context, Isometry3, Model, PinholeCamera, Problem};
-use hicp_icp::{Observer, Outcome, Session, Stage, Termination, Workspace};
+use hicp_icp::{Cascade, Observer, Outcome, Session, Stage, Termination, Workspace};
 use hicp_score::{MeanVsd, Score};
 use hicp_switch::{PAPER_ALPHA, Regime, RegimeEvent, Switch, Switcher, Threshold};
 
@@ -53,6 +53,39 @@ fn mark(switcher: impl Switcher) -> (f64, Vec<RegimeEvent>) {
         &mut session,
     );
     (outcome.camera_from_object.translation.vector.x, regimes.0)
+}
+
+/// A switcher that is aligned inside of a cascade.
+struct InCascade;
+
+impl Switcher for InCascade {
+    fn regime(&mut self, context: &mut Context<'_>, pose: &Isometry3<f64>) -> RegimeEvent {
+        let mut regime = match context.cascade_init() {
+            Some(_) => Regime::ALIGNED,
+            None => Regime::MISALIGNED,
+        };
+        regime.regime(context, pose)
+    }
+}
+
+#[test]
+fn a_switcher_knows_the_initial_pose_of_its_cascade() {
+    let model = Model::new(cuboid(0.1, 0.1, 0.1));
+    let camera = PinholeCamera::new(10.0, 10.0, 3.5, 3.5, 8, 8).unwrap();
+    let observation = observe_depth(depth_image(&camera, |_| 1.0), &camera);
+    let problem = Problem::new(&model, &observation);
+    let (mut workspace, init) = (Workspace::new(RayCaster), Isometry3::identity());
+    let mut marked = |stage: &mut dyn Stage| {
+        let outcome = stage.run(&problem, &init, &mut Session::new(&mut workspace, &mut ()));
+        outcome.camera_from_object.translation.x
+    };
+    let switch = || Switch {
+        switcher: InCascade,
+        aligned: Mark(1.0),
+        misaligned: Mark(2.0),
+    };
+    assert_eq!(marked(&mut switch()), 2.0);
+    assert_eq!(marked(&mut Cascade((switch(),))), 1.0);
 }
 
 #[test]

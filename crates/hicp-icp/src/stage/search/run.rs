@@ -28,7 +28,7 @@ pub(crate) struct Run<'a, 's> {
 impl Run<'_, '_> {
     /// Scores a pose.
     pub(crate) fn score(&mut self, score: &mut impl Score, pose: &Isometry3<f64>) -> f64 {
-        score.score(&mut self.session.workspace.context(self.problem), pose)
+        score.score(&mut self.session.context(self.problem), pose)
     }
 
     /// Runs a stage and counts its iterations.
