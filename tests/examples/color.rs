@@ -8,13 +8,12 @@
 //! and blue), `shadow`, `shifted` (by 5 pixels) or `overexposed`. A pose fails if its MSSD is above
 //! a tenth of the diameter; no symmetry is declared. Half of the objects are symmetric in depth.
 
-use hicp_sim::{Household, Lighting, Texture, stream};
-use hicp_tests::median;
+use hicp_sim::{Lighting, Texture, stream};
 use hicp_tests::painted::Painted;
 use hicp_tests::tabletop::MaskKind;
+use hicp_tests::{household, mean, median, points_of};
 use hybrid_icp::core::{ColorImage, Isometry3, Observation};
 use hybrid_icp::icp::Alternative;
-use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refinement, Refiner, presets};
 
 const FAULTS: [&str; 6] = [
@@ -42,11 +41,7 @@ struct Row {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let cases: usize = arguments.next().map_or(Ok(200), |text| text.parse())?;
-    let objects = match arguments.next().as_deref() {
-        None | Some("tuning") => Household::TUNING,
-        Some("test") => Household::TEST,
-        Some(other) => return Err(format!("{other}: expected tuning or test").into()),
-    };
+    let objects = household(arguments.next().as_deref().unwrap_or("tuning"))?;
     let fault = arguments.next().unwrap_or_else(|| FAULTS[0].to_owned());
     if !FAULTS.contains(&fault.as_str()) {
         return Err(format!("{fault}: expected one of {FAULTS:?}").into());
@@ -61,11 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let painted = Painted::new(&objects, &textures)?;
     let scenes = &painted.scenes;
-    let points: Vec<ModelPoints> = scenes
-        .objects
-        .iter()
-        .map(|o| ModelPoints::new(&o.1))
-        .collect();
+    let points = points_of(scenes);
     let mut searching = Refiner::boxed(presets::color());
     let mut estimating = Refiner::preset(Preset::Local);
     let mut auto = Refiner::preset(Preset::Auto);
@@ -150,7 +141,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let pipelines = if only_refine { 2 } else { 4 };
         for (name, row) in names.iter().zip(rows).take(pipelines) {
             let percent = |count: usize| 100.0 * count as f64 / n.max(1) as f64;
-            let mean = row.milliseconds.iter().sum::<f64>() / n.max(1) as f64;
+            let mean = mean(&row.milliseconds);
             row.errors.sort_by(f64::total_cmp);
             let error = |share: f64| {
                 let index = share * row.errors.len().saturating_sub(1) as f64;
@@ -175,7 +166,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut auto: Vec<f64> = costs.iter().map(|[auto, _]| *auto).collect();
         let mut ratios: Vec<f64> = costs.iter().map(|[auto, color]| color / auto).collect();
         let mut more: Vec<f64> = costs.iter().map(|[auto, color]| color - auto).collect();
-        let mean = more.iter().sum::<f64>() / more.len().max(1) as f64;
+        let mean = mean(&more);
         let (auto, ratio, more) = (median(&mut auto), median(&mut ratios), median(&mut more));
         println!(
             "| {kind} | {} | {auto:.1} | {ratio:.2} | {more:.1} | {mean:.1} |",

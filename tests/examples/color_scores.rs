@@ -8,10 +8,11 @@
 
 use hicp_sim::{Household, Lighting, Texture, stream};
 use hicp_tests::painted::Painted;
+use hicp_tests::points_of;
 use hicp_tests::tabletop::MaskKind;
 use hybrid_icp::core::{Context, Isometry3, Problem, RenderCache};
 use hybrid_icp::raster::Rasterizer;
-use hybrid_icp::score::{ColorAgreement, ModelPoints, SampledColor, Shading};
+use hybrid_icp::score::{ColorAgreement, SampledColor, Shading};
 
 const OBJECTS: [Household; 4] = [
     Household::Bottle,
@@ -37,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let hard = arguments.next().is_some_and(|word| word == "hard");
     let painted = Painted::new(&OBJECTS, &[Texture::Stripes, Texture::Logos, Texture::Text])?;
     let objects = &painted.scenes.objects;
-    let points: Vec<ModelPoints> = objects.iter().map(|o| ModelPoints::new(&o.1)).collect();
+    let points = points_of(&painted.scenes);
     let mut rows: [Row; 6] = Default::default();
     let mut n = 0;
     'scenes: for seed in 0.. {

@@ -9,21 +9,16 @@
 
 use std::time::Instant;
 
-use hicp_sim::{Household, rng};
-use hicp_tests::median;
+use hicp_sim::rng;
 use hicp_tests::tabletop::{MaskKind, Tabletop};
+use hicp_tests::{household, mean, median, points_of};
 use hybrid_icp::core::{Mask, Observation};
-use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refiner, mask_in_box};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let cases: usize = arguments.next().map_or(Ok(1000), |text| text.parse())?;
-    let objects = match arguments.next().as_deref() {
-        None | Some("tuning") => Household::TUNING,
-        Some("test") => Household::TEST,
-        Some(other) => return Err(format!("{other}: expected tuning or test").into()),
-    };
+    let objects = household(arguments.next().as_deref().unwrap_or("tuning"))?;
     let mask = arguments.next().unwrap_or_else(|| "exact".to_owned());
     let kinds = MaskKind::ALL.into_iter();
     let kind = kinds.clone().find(|kind| mask.starts_with(&kind.name()));
@@ -34,11 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         None => Preset::Local,
     };
     let scenes = Tabletop::new(&objects)?;
-    let points: Vec<ModelPoints> = scenes
-        .objects
-        .iter()
-        .map(|o| ModelPoints::new(&o.1))
-        .collect();
+    let points = points_of(&scenes);
     let names = ["search from a rough pose", "estimate"];
     let mut refiners = [Refiner::preset(Preset::Search), Refiner::preset(stage)];
     let (mut failed, mut times) = ([0_usize; 2], [Vec::new(), Vec::new()]);
@@ -77,11 +68,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{n} cases, masks: {mask}\n");
     println!("| pipeline | failed | time, median | mean |\n|---|---|---|---|");
     for (index, name) in names.iter().enumerate() {
-        let mean = times[index].iter().sum::<f64>() / n as f64;
         println!(
-            "| {name} | {:.1} % | {:.1} ms | {mean:.1} ms |",
+            "| {name} | {:.1} % | {:.1} ms | {:.1} ms |",
             100.0 * failed[index] as f64 / n as f64,
             median(&mut times[index]),
+            mean(&times[index]),
         );
     }
     // The standard error of the difference of two paired shares.

@@ -17,8 +17,8 @@ use std::time::Instant;
 
 use hicp_io::bop::{Dataset, read_results};
 use hicp_sim::{Household, perturb, stream};
-use hicp_tests::median;
 use hicp_tests::tabletop::{MaskKind, Tabletop};
+use hicp_tests::{mean, median};
 use hybrid_icp::core::{Isometry3, Model, Observation, Problem};
 use hybrid_icp::icp::{BoxedStage, Workspace};
 use hybrid_icp::pipeline::PipelineFile;
@@ -106,14 +106,13 @@ impl Study {
             );
             println!("|---|---:|---:|---:|---:|---:|---:|");
             let exact = &results[0];
-            let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len() as f64;
             for (index, results) in results.iter().enumerate() {
                 let pairs = results.failed.iter().zip(&exact.failed);
                 let differences: Vec<f64> = pairs
                     .map(|(a, b)| 100.0 * (f64::from(u8::from(*a)) - f64::from(u8::from(*b))))
                     .collect();
                 let n = differences.len() as f64;
-                let difference = differences.iter().sum::<f64>() / n;
+                let difference = mean(&differences);
                 let squares = differences.iter().map(|d| (d - difference).powi(2));
                 let half = 1.96 * (squares.sum::<f64>() / (n * (n - 1.0))).sqrt();
                 let failed = results.failed.iter().filter(|failed| **failed).count();

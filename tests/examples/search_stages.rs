@@ -19,7 +19,7 @@ use hicp_sim::{
 };
 use hicp_tests::mugs::public_mugs;
 use hicp_tests::tabletop::{MaskKind, Tabletop};
-use hicp_tests::{camera, median};
+use hicp_tests::{camera, household, mean, median};
 use hybrid_icp::core::{Isometry3, Model, Observation, Point3, Problem, Vector3, rotation_grid};
 use hybrid_icp::icp::{BoxedStage, Cascade, SearchOptions, Session, Stage, Workspace};
 use hybrid_icp::raster::Rasterizer;
@@ -284,7 +284,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let names = ["search", "auto", "auto from near", "local from near"];
     for (k, name) in names.iter().enumerate() {
         let times = &mut counts.milliseconds[k];
-        let mean = times.iter().sum::<f64>() / times.len() as f64;
+        let mean = mean(times);
         let missed = counts
             .missed
             .get(k)
@@ -312,11 +312,6 @@ fn each_case(
     random: &mut SimRng,
     mut visit: impl FnMut(&Seen<'_>),
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let objects: &[Household] = match set {
-        "tuning" | "undeclared" => &Household::TUNING,
-        "test" => &Household::TEST,
-        _ => return handles(set, seeds, kind, random, visit),
-    };
     let table = match set {
         "undeclared" => Tabletop::of(
             [
@@ -334,7 +329,8 @@ fn each_case(
             })
             .collect::<Result<_, hicp_sim::SimError>>()?,
         ),
-        _ => Tabletop::new(objects)?,
+        "tuning" | "test" => Tabletop::new(&household(set)?)?,
+        _ => return handles(set, seeds, kind, random, visit),
     };
     for seed in seeds {
         for seen in table.scene(seed)? {

@@ -6,8 +6,8 @@
 
 use std::time::Instant;
 
-use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
-use hicp_tests::{OBJECTS, median, scene, symmetric_pose_distance};
+use hicp_tests::starts::{Start, starts};
+use hicp_tests::{mean, median, symmetric_pose_distance};
 use hybrid_icp::core::Problem;
 use hybrid_icp::score::{ModelPoints, Score, Vsd};
 use hybrid_icp::{Preset, Refiner};
@@ -32,43 +32,33 @@ fn main() {
     });
     let mut refiners =
         Preset::ALL.map(|preset| (preset, Refiner::preset(preset), Column::default()));
-    for (seed, object) in (0..).zip(OBJECTS) {
-        let mut rng = rng(seed);
-        for _ in 0..STARTS_PER_OBJECT {
-            let scene = scene(object, noise, &mut rng);
-            let points = ModelPoints::new(&scene.model);
-            let init = perturb(
-                &mut rng,
-                &scene.truth,
-                MEAN_TRANSLATION_ERROR_METERS,
-                MEAN_ROTATION_ERROR_DEGREES.to_radians(),
+    for Start { scene, init } in starts(STARTS_PER_OBJECT, noise) {
+        let points = ModelPoints::new(&scene.model);
+        for (_, refiner, column) in &mut refiners {
+            // A new observation for each preset, so that every time includes normals and search
+            // trees.
+            let start = Instant::now();
+            let observation = scene.observe_again();
+            let refined = refiner.refine(&scene.model, &observation, &init);
+            column
+                .milliseconds
+                .push(start.elapsed().as_secs_f64() * 1e3);
+            let pose = refined.outcome.camera_from_object;
+            let (angle, distance) =
+                symmetric_pose_distance(&pose, &scene.truth, scene.model.symmetries());
+            column.angles.push(angle.to_degrees());
+            column.distances.push(distance * 1e3);
+            let problem = Problem::new(&scene.model, &observation);
+            let mut context = refiner.workspace_mut().context(&problem);
+            let mut vsd = Vsd::new(scene.truth);
+            let (before, after) = (
+                vsd.score(&mut context, &init),
+                vsd.score(&mut context, &pose),
             );
-            for (_, refiner, column) in &mut refiners {
-                // A new observation for each preset, so that every time includes normals and search
-                // trees.
-                let start = Instant::now();
-                let observation = scene.observe_again();
-                let refined = refiner.refine(&scene.model, &observation, &init);
-                column
-                    .milliseconds
-                    .push(start.elapsed().as_secs_f64() * 1e3);
-                let pose = refined.outcome.camera_from_object;
-                let (angle, distance) =
-                    symmetric_pose_distance(&pose, &scene.truth, scene.model.symmetries());
-                column.angles.push(angle.to_degrees());
-                column.distances.push(distance * 1e3);
-                let problem = Problem::new(&scene.model, &observation);
-                let mut context = refiner.workspace_mut().context(&problem);
-                let mut vsd = Vsd::new(scene.truth);
-                let (before, after) = (
-                    vsd.score(&mut context, &init),
-                    vsd.score(&mut context, &pose),
-                );
-                column.vsd.push(after);
-                column.worse += usize::from(after > before);
-                let mssd = points.mssd(&pose, &scene.truth);
-                column.right += usize::from(mssd < 0.1 * points.diameter());
-            }
+            column.vsd.push(after);
+            column.worse += usize::from(after > before);
+            let mssd = points.mssd(&pose, &scene.truth);
+            column.right += usize::from(mssd < 0.1 * points.diameter());
         }
     }
 
@@ -76,7 +66,6 @@ fn main() {
         "| pipeline | median rotation error | median translation error | mean VSD | VSD > 0.3 | ends worse than it started | time, ratio of medians | of means | MSSD < 0.1 d |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    let mean = |times: &[f64]| times.iter().sum::<f64>() / times.len() as f64;
     let baseline = refiners
         .iter_mut()
         .find(|(preset, ..)| *preset == Preset::NnPointToPoint)
@@ -90,7 +79,7 @@ fn main() {
             "| {preset} | {:.3}° | {:.3} mm | {:.3} | {:.1} % | {:.1} % | {:.2} | {:.2} | {:.1} % |",
             median(&mut column.angles),
             median(&mut column.distances),
-            column.vsd.iter().sum::<f64>() / count,
+            mean(&column.vsd),
             100.0 * failed / count,
             100.0 * column.worse as f64 / count,
             median(&mut column.milliseconds) / baseline.0,

@@ -13,9 +13,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use hicp_sim::{
-    ClutterView, DepthNoise, DepthSensor, Hand, Household, MovingConfig, MovingScene,
-    RelativeGaussian, Trajectory, perturb, stream,
+    ClutterView, DepthNoise, DepthSensor, Hand, MovingConfig, MovingScene, RelativeGaussian,
+    Trajectory, perturb, stream,
 };
+use hicp_tests::household;
 use hicp_tests::mugs::public_mugs;
 use hybrid_icp::core::{Isometry3, Mask, Model, Observation, PinholeCamera, Point3};
 use hybrid_icp::score::mssd;
@@ -59,11 +60,7 @@ fn main() -> Result<(), Failure> {
     let objects = if has("mugs") {
         public_mugs()?
     } else {
-        let set = if has("tuning") {
-            Household::TUNING
-        } else {
-            Household::TEST
-        };
+        let set = household(if has("tuning") { "tuning" } else { "test" })?;
         let models = set.map(|object| object.model().map(|model| (object.name(), model)));
         models.into_iter().collect::<Result<_, _>>()?
     };

@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use hicp_io::bop::{Dataset, read_results};
-use hicp_tests::median;
 use hicp_tests::ycbv::{Instance, instances, root};
+use hicp_tests::{mean, median};
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::icp::RayShift;
 use hybrid_icp::score::{ModelPoints, adi};
@@ -113,7 +113,7 @@ fn main() {
                 adi_mm(instance, &refined.outcome.camera_from_object)
             })
             .fold(0.0, f64::max);
-        let mean_time = times.iter().sum::<f64>() / times.len() as f64;
+        let mean_time = mean(&times);
         let time = median(&mut times);
         let refine_time = median(&mut refine_times);
         if preset == Some(Preset::NnPointToPoint) {

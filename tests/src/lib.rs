@@ -16,6 +16,9 @@ use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Symmetries, se3,
 };
 use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::score::ModelPoints;
+
+use crate::tabletop::Tabletop;
 
 /// The ten objects of the starts and of the figures quoted from them.
 pub const OBJECTS: [Household; 10] = [
@@ -102,6 +105,30 @@ pub fn median(values: &mut [f64]) -> f64 {
         n if n % 2 == 1 => values[middle],
         _ => f64::midpoint(values[middle - 1], values[middle]),
     }
+}
+
+/// Returns the mean of the values, or NaN without values.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Returns the household objects that a word on the command line selects.
+///
+/// # Errors
+///
+/// If the word is neither `tuning` nor `test`.
+pub fn household(word: &str) -> Result<[Household; 10], String> {
+    match word {
+        "tuning" => Ok(Household::TUNING),
+        "test" => Ok(Household::TEST),
+        other => Err(format!("{other}: expected tuning or test")),
+    }
+}
+
+/// Prepares the pose errors of every object, in the order of [`Tabletop::objects`].
+pub fn points_of(scenes: &Tabletop) -> Vec<ModelPoints> {
+    let objects = scenes.objects.iter();
+    objects.map(|(_, model)| ModelPoints::new(model)).collect()
 }
 
 /// Returns the camera of the synthetic scenes: 640×480 pixels, 60° wide.
