@@ -44,6 +44,7 @@ pub use cloud::Cloud;
 pub use correspondences::{Correspondences, Pair, RigidTransform};
 pub use derived::Derived;
 pub use id::Id;
+pub use internal::suggest::UnknownName;
 pub use nalgebra;
 pub use nalgebra::{
     Isometry3, Matrix3, Matrix4, Matrix6, Point2, Point3, Quaternion, Translation3, UnitQuaternion,

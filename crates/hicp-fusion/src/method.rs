@@ -2,7 +2,8 @@
 
 use std::str::FromStr;
 
-use thiserror::Error;
+use hicp_core::UnknownName;
+use hicp_core::internal::named;
 
 use crate::batch::BatchFuser;
 use crate::config::FuserConfig;
@@ -105,23 +106,10 @@ impl std::fmt::Display for FusionMethod {
     }
 }
 
-/// The error for a name that is not one of the six methods.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("no fusion method is named {name:?}; the names are: {}", FusionMethod::ALL.map(FusionMethod::name).join(", "))]
-pub struct UnknownMethod {
-    /// The name given.
-    pub name: String,
-}
-
 impl FromStr for FusionMethod {
-    type Err = UnknownMethod;
+    type Err = UnknownName;
 
-    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        Self::ALL
-            .into_iter()
-            .find(|method| method.name() == name)
-            .ok_or_else(|| UnknownMethod {
-                name: name.to_owned(),
-            })
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        named("fusion method", name, &Self::ALL, Self::name)
     }
 }

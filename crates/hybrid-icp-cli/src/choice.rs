@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
+use hybrid_icp::core::UnknownName;
 use hybrid_icp::pipeline::PipelineFile;
-use hybrid_icp::{BoxedStage, Preset, Refiner, UnknownPreset};
+use hybrid_icp::{BoxedStage, Preset, Refiner};
 
 use crate::limits::pipeline_limits;
 
@@ -57,9 +58,9 @@ pub(crate) enum Source {
 }
 
 impl FromStr for Source {
-    type Err = UnknownPreset;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, UnknownPreset> {
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
         match text.ends_with(".toml") {
             true => Ok(Self::File(text.into())),
             false => text.parse().map(Self::Preset),

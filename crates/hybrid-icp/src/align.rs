@@ -6,9 +6,10 @@ use hicp_association::{
     AllSamples, MaxDistance, NearestNeighbor, SearchIndex, Stride, estimate_normals,
     voxel_downsample,
 };
-use hicp_core::internal::{coordinate_step, nearest_name};
+use hicp_core::internal::{coordinate_step, named};
 use hicp_core::{
-    Cloud, Isometry3, Matrix6, Point3, Problem, Source, Surfel, Target, UnitVector3, Vector3,
+    Cloud, Isometry3, Matrix6, Point3, Problem, Source, Surfel, Target, UnitVector3, UnknownName,
+    Vector3,
 };
 use hicp_icp::{
     BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, SmallMotion, Stage, Termination,
@@ -185,29 +186,11 @@ where
 }
 
 impl FromStr for Registration {
-    type Err = UnknownRegistration;
+    type Err = UnknownName;
 
-    fn from_str(name: &str) -> Result<Self, UnknownRegistration> {
-        let named = Self::ALL.into_iter().find(|found| found.name() == name);
-        named.ok_or_else(|| UnknownRegistration {
-            name: name.to_owned(),
-            suggestion: nearest_name(name, Self::ALL.map(Self::name)),
-        })
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        named("registration", name, &Self::ALL, Self::name)
     }
-}
-
-/// A name that no registration has.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error(
-    "no registration is named {name:?}{} The names are: {}",
-    suggestion.map_or_else(|| ".".to_owned(), |name| format!("; did you mean {name:?}?")),
-    Registration::ALL.map(Registration::name).join(", ")
-)]
-pub struct UnknownRegistration {
-    /// The name given.
-    pub name: String,
-    /// The name nearest to it, if one is near.
-    pub suggestion: Option<&'static str>,
 }
 
 /// One of the two clouds of a registration.

@@ -97,8 +97,7 @@ pub use hicp_score as score;
 pub use hicp_switch as switch;
 
 pub use align::{
-    Alignment, CloudOptions, CloudSide, CloudWarning, NormalCount, Registration,
-    UnknownRegistration, align,
+    Alignment, CloudOptions, CloudSide, CloudWarning, NormalCount, Registration, align,
 };
 pub use batch::refine_batch;
 pub use calibration::Calibration;
@@ -109,7 +108,7 @@ pub use checks::{
 pub use diagnosis::{Diagnosis, Fault, Finding};
 pub use hicp_icp::BoxedStage;
 pub use mask_in_box::mask_in_box;
-pub use preset::{Preset, UnknownPreset};
+pub use preset::Preset;
 pub use refiner::{Refinement, Refiner};
 pub use sequential::SequentialEstimator;
 pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs};

@@ -2,9 +2,9 @@
 
 use std::str::FromStr;
 
-use hicp_core::internal::nearest_name;
+use hicp_core::UnknownName;
+use hicp_core::internal::named;
 use hicp_icp::BoxedStage;
-use thiserror::Error;
 
 use crate::presets;
 
@@ -98,36 +98,11 @@ impl std::fmt::Display for Preset {
     }
 }
 
-/// A name that no preset has.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("no pipeline is named {name:?}{} The names are: {}", did_you_mean(*suggestion), names())]
-pub struct UnknownPreset {
-    /// The name given.
-    pub name: String,
-    /// The name nearest to it, if one is near.
-    pub suggestion: Option<&'static str>,
-}
-
-fn did_you_mean(suggestion: Option<&str>) -> String {
-    suggestion.map_or_else(
-        || ".".to_owned(),
-        |name| format!("; did you mean {name:?}?"),
-    )
-}
-
-fn names() -> String {
-    Preset::ALL.map(Preset::name).join(", ")
-}
-
 impl FromStr for Preset {
-    type Err = UnknownPreset;
+    type Err = UnknownName;
 
-    fn from_str(name: &str) -> Result<Self, UnknownPreset> {
-        let named = Self::ALL.into_iter().find(|preset| preset.name() == name);
-        named.ok_or_else(|| UnknownPreset {
-            name: name.to_owned(),
-            suggestion: nearest_name(name, Self::ALL.map(Self::name)),
-        })
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        named("pipeline", name, &Self::ALL, Self::name)
     }
 }
 

@@ -1,4 +1,47 @@
-//! Suggestions for misspelled names.
+//! Values by their names, and suggestions for misspelled names.
+
+use thiserror::Error;
+
+/// The error for a name that nothing has.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error(
+    "no {what} is named {found:?}{} The names are: {}",
+    suggestion.map_or_else(|| ".".to_owned(), |name| format!("; did you mean {name:?}?")),
+    known.join(", ")
+)]
+pub struct UnknownName {
+    /// The kind of the values that have names, such as "pipeline".
+    pub what: &'static str,
+    /// The name given.
+    pub found: String,
+    /// The name nearest to it, if one is near.
+    pub suggestion: Option<&'static str>,
+    /// All names.
+    pub known: Vec<&'static str>,
+}
+
+/// Returns the value with a name.
+///
+/// # Errors
+///
+/// [`UnknownName`] if none of the values has it. `what` is their kind.
+pub fn named<T: Copy>(
+    what: &'static str,
+    text: &str,
+    all: &[T],
+    name: fn(T) -> &'static str,
+) -> Result<T, UnknownName> {
+    let found = all.iter().copied().find(|value| name(*value) == text);
+    found.ok_or_else(|| {
+        let known: Vec<_> = all.iter().copied().map(name).collect();
+        UnknownName {
+            what,
+            found: text.to_owned(),
+            suggestion: nearest_name(text, known.iter().copied()),
+            known,
+        }
+    })
+}
 
 /// Returns the candidate with the fewest edits from a name.
 ///

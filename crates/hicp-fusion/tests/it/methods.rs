@@ -25,6 +25,9 @@ fn names_parse_to_their_methods() {
     assert!(summaries.iter().all(|line| line.contains("estimate")));
     let error = "kalman".parse::<FusionMethod>().unwrap_err();
     assert!(error.to_string().contains("weighted-average"), "{error}");
+    let error = "averag".parse::<FusionMethod>().unwrap_err();
+    let expected = "no fusion method is named \"averag\"; did you mean \"average\"?";
+    assert!(error.to_string().starts_with(expected), "{error}");
 }
 
 #[test]

@@ -9,7 +9,8 @@ use std::str::FromStr;
 use clap::{Args, Subcommand, ValueEnum};
 use hicp_experiments::{Config, Experiment, Variant};
 use hicp_sim::Household;
-use hybrid_icp::{Preset, UnknownPreset};
+use hybrid_icp::Preset;
+use hybrid_icp::core::UnknownName;
 
 use self::study::{StudyOptions, report};
 use crate::choice::Source;
@@ -88,9 +89,9 @@ enum Choice {
 }
 
 impl FromStr for Choice {
-    type Err = UnknownPreset;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, UnknownPreset> {
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
         match text {
             "all" => Ok(Self::All),
             one => one.parse().map(Self::One),
