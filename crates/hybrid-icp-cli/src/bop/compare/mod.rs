@@ -126,12 +126,12 @@ impl Arguments {
         say(format_args!("\n{name}:"))?;
         let json = self.out.join(format!("{name}.json"));
         let job = EvalJob {
-            dataset: &self.dataset,
-            results,
+            dataset: self.dataset.clone(),
+            results: results.to_owned(),
             targets: None,
             symmetric: None,
             delta_mm: DELTA_MM,
-            json: Some(&json),
+            json: Some(json),
             errors: None,
             calibration: false,
             threads: self.threads,

@@ -1,9 +1,10 @@
 //! The evaluation of a result file, for every command that needs one.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
+use clap::Args;
 use hicp_bop::{EvaluatedObject, FrameKey, Judge, Judged, JudgedFrame, Renders, Scenes, Targets};
 use hicp_io::bop::ResultRow;
 use rayon::prelude::*;
@@ -14,6 +15,7 @@ use super::report::{Report, Summary};
 use crate::bop::options::{DatasetOptions, ThreadOptions};
 use crate::bop::{faults, models, targets};
 use crate::limits::limits;
+use crate::options::positive;
 use crate::terminal::{progress_bar, say, warn};
 
 /// The benchmark's visibility tolerance in millimeters.
@@ -23,31 +25,45 @@ pub(crate) const DELTA_MM: f64 = 15.0;
 const MISFITS_SHOWN: usize = 10;
 
 /// An evaluation of a result file.
-pub(crate) struct EvalJob<'a> {
-    pub(crate) dataset: &'a DatasetOptions,
-    pub(crate) results: &'a Path,
-    /// The file of targets; the dataset's if `None`.
-    pub(crate) targets: Option<&'a Path>,
-    /// Objects whose AD is ADI; those with declared symmetries if `None`.
-    pub(crate) symmetric: Option<&'a [u32]>,
-    /// Visibility tolerance of VSD in millimeters.
+#[derive(Debug, Args)]
+pub(crate) struct EvalJob {
+    #[command(flatten)]
+    pub(crate) dataset: DatasetOptions,
+    /// The result file: CSV with scene_id, im_id, obj_id, score, R, t and time.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) results: PathBuf,
+    /// The file of targets; test_targets_bop19.json of the dataset if not given. Without both,
+    /// every visible instance is a target.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) targets: Option<PathBuf>,
+    /// Ids of the objects whose AD is ADI; those with declared symmetries if not given.
+    #[arg(long, value_name = "ID,…", value_delimiter = ',')]
+    pub(crate) symmetric: Option<Vec<u32>>,
+    /// Visibility tolerance of VSD in millimeters; the benchmark uses 5 for ITODD.
+    #[arg(long = "delta", value_name = "MM", default_value_t = DELTA_MM, value_parser = positive)]
     pub(crate) delta_mm: f64,
-    /// The file for the recalls as JSON.
-    pub(crate) json: Option<&'a Path>,
-    /// The file for the errors of every estimate.
-    pub(crate) errors: Option<&'a Path>,
-    /// If `true`, reports how well the scores rank correct poses first.
+    /// Also write the recalls as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) json: Option<PathBuf>,
+    /// Also write the errors of every estimate against every instance of its target as CSV.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) errors: Option<PathBuf>,
+    /// Also report whether the scores, from 0 to 1, rank correct rows first: the area under the ROC
+    /// curve, and the share of correct rows by range of the score. A row is correct if its ADI is
+    /// below a tenth of the diameter.
+    #[arg(long)]
     pub(crate) calibration: bool,
+    #[command(flatten)]
     pub(crate) threads: ThreadOptions,
 }
 
-impl EvalJob<'_> {
+impl EvalJob {
     /// Evaluates the file, prints the table, and writes the outputs.
     pub(crate) fn run(&self) -> anyhow::Result<Report> {
-        let rows = limits().read_results(self.results)?;
+        let rows = limits().read_results(&self.results)?;
         let dataset = self.dataset.open()?;
         let split = &self.dataset.split;
-        let wanted = targets::choose(&dataset, split, self.targets)?;
+        let wanted = targets::choose(&dataset, split, self.targets.as_deref())?;
         let has_target = |row: &ResultRow| {
             let of_frame = wanted.get(&(row.scene_id, row.im_id));
             of_frame.is_some_and(|objects| objects.contains_key(&row.obj_id))
@@ -69,7 +85,7 @@ impl EvalJob<'_> {
         let models = pool.install(|| models::read(&models_dir, &objects))?;
         let diameters =
             pool.install(|| models::wrong_diameters(&models, &models_dir.join("models_info.json")));
-        let objects = EvaluatedObject::of_models(&models, self.symmetric);
+        let objects = EvaluatedObject::of_models(&models, self.symmetric.as_deref());
         let judge = Judge::new(objects, &scenes, &rows, 1e-3 * self.delta_mm);
         let progress = progress_bar(wanted.len(), "images");
         let images: Vec<(&FrameKey, &BTreeMap<u32, u32>)> = wanted.iter().collect();
@@ -121,10 +137,10 @@ impl EvalJob<'_> {
             calibration,
             adi_m: adi_m.collect(),
         };
-        if let Some(path) = self.errors {
+        if let Some(path) = &self.errors {
             errors::write(path, &targets, &rows)?;
         }
-        if let Some(path) = self.json {
+        if let Some(path) = &self.json {
             let text = serde_json::to_string_pretty(&report).context("cannot write JSON")?;
             hicp_io::write_atomically(path, |file| writeln!(file, "{text}"))?;
         }

@@ -5,14 +5,10 @@ mod errors;
 mod job;
 mod report;
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 pub(crate) use self::job::{DELTA_MM, EvalJob};
 pub(crate) use self::report::{Report, Summary};
-use super::options::{DatasetOptions, ThreadOptions};
-use crate::options::positive;
 use crate::outputs::Files;
 
 /// Compare a result file with the ground truth, as the BOP benchmark does.
@@ -30,33 +26,7 @@ use crate::outputs::Files;
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    dataset: DatasetOptions,
-    /// The result file: CSV with scene_id, im_id, obj_id, score, R, t and time.
-    #[arg(long, value_name = "FILE.csv")]
-    results: PathBuf,
-    /// The file of targets; test_targets_bop19.json of the dataset if not given. Without both,
-    /// every visible instance is a target.
-    #[arg(long, value_name = "FILE.json")]
-    targets: Option<PathBuf>,
-    /// Ids of the objects whose AD is ADI; those with declared symmetries if not given.
-    #[arg(long, value_name = "ID,…", value_delimiter = ',')]
-    symmetric: Option<Vec<u32>>,
-    /// Visibility tolerance of VSD in millimeters; the benchmark uses 5 for ITODD.
-    #[arg(long, value_name = "MM", default_value_t = DELTA_MM, value_parser = positive)]
-    delta: f64,
-    /// Also write the recalls as JSON.
-    #[arg(long, value_name = "FILE.json")]
-    json: Option<PathBuf>,
-    /// Also write the errors of every estimate against every instance of its target as CSV.
-    #[arg(long, value_name = "FILE.csv")]
-    errors: Option<PathBuf>,
-    /// Also report whether the scores, from 0 to 1, rank correct rows first: the area under the ROC
-    /// curve, and the share of correct rows by range of the score. A row is correct if its ADI is
-    /// below a tenth of the diameter.
-    #[arg(long)]
-    calibration: bool,
-    #[command(flatten)]
-    threads: ThreadOptions,
+    job: EvalJob,
 }
 
 const USAGE: &str = "\
@@ -70,23 +40,13 @@ Example:
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let job = &arguments.job;
     let files = Files::default()
-        .reads("--results", [&arguments.results])
-        .reads("--targets", &arguments.targets)
-        .writes("--json", &arguments.json)
-        .writes("--errors", &arguments.errors);
+        .reads("--results", [&job.results])
+        .reads("--targets", &job.targets)
+        .writes("--json", &job.json)
+        .writes("--errors", &job.errors);
     files.check()?;
-    files.spare_dataset(&arguments.dataset.root, &arguments.dataset.split)?;
-    let job = EvalJob {
-        dataset: &arguments.dataset,
-        results: &arguments.results,
-        targets: arguments.targets.as_deref(),
-        symmetric: arguments.symmetric.as_deref(),
-        delta_mm: arguments.delta,
-        json: arguments.json.as_deref(),
-        errors: arguments.errors.as_deref(),
-        calibration: arguments.calibration,
-        threads: arguments.threads,
-    };
+    files.spare_dataset(&job.dataset.root, &job.dataset.split)?;
     job.run().map(|_| ())
 }
