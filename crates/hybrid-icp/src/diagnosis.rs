@@ -25,6 +25,9 @@ use crate::warning::Warning;
 const CLEAR: f64 = 0.05;
 /// The same for distances along the ray, which differ little from depths.
 const CLEAR_RAY: f64 = 0.03;
+/// A corrected score from which on the correction explains nothing. With the model or the mask of
+/// another object, most corrections improve the score, but no score is good.
+const UNEXPLAINED: f64 = 0.5;
 /// Share of the distance: a move by it is as costly as a move by the diameter.
 const DISTANCE: f64 = 0.2;
 
@@ -51,7 +54,7 @@ pub struct Finding {
 ///
 /// Each of some 25 hypotheses corrects the inputs as if they had one fault. A short refinement then
 /// scores the corrected inputs, if their initial pose explains the image better than most others. A
-/// fault is named if its correction improves the score clearly.
+/// fault is named if its correction improves the score clearly, and to less than a half.
 ///
 /// The score is the MVE of the refined pose, plus the mean distance in diameters by which the
 /// refinement moved the object's points. It is 1 if the numbers of the inputs exclude each other
@@ -121,11 +124,11 @@ impl Diagnosis {
             let (corrected, _) = judge.refined(&inputs);
             let is_named = match fault {
                 // Pixels without a measurement have no effect on the score.
-                Fault::MaskTooLarge { outside } if outside > 0.5 => corrected < 0.5,
+                Fault::MaskTooLarge { outside } if outside > 0.5 => true,
                 Fault::RayDistance => corrected + CLEAR_RAY < score,
                 _ => corrected + handicap + CLEAR < score,
             };
-            if is_named {
+            if is_named && corrected < UNEXPLAINED {
                 let score = Some(corrected);
                 found.push((corrected + handicap, Finding { fault, score }));
             }
@@ -187,7 +190,12 @@ impl Judge {
         let depth = Arc::clone(&inputs.depth);
         let observation = Observation::new(depth, inputs.mask.as_ref().clone(), inputs.camera);
         let observation = observation.ok()?;
-        let excluded = |warning: &Warning| !matches!(warning, Warning::CoarseCoordinates { .. });
+        let excluded = |warning: &Warning| {
+            !matches!(
+                warning,
+                Warning::CoarseCoordinates { .. } | Warning::Center { .. }
+            )
+        };
         let warnings = warnings(&inputs.model, &observation, &inputs.init);
         (!warnings.iter().any(excluded)).then_some(observation)
     }
