@@ -210,7 +210,10 @@ impl Form<'_> {
             }
             [_, _, _, _, _, _, _, _, _] => Matrix3::from_row_slice(&numbers),
             _ => {
-                let found = format!("{} numbers", numbers.len());
+                let found = match numbers.len() {
+                    0 => "no numbers, or one that is not finite".to_owned(),
+                    count => format!("{count} numbers"),
+                };
                 return Err(self.refuse("", found, "fx, fy, cx and cy, or a 3x3 matrix"));
             }
         };

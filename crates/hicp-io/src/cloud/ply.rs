@@ -11,30 +11,38 @@ use crate::mesh::raw::Reading;
 use crate::unit::LengthUnit;
 
 /// Parses the vertices of an ASCII or binary PLY file. Faces and other elements are skipped.
+///
+/// In a file with normals, so are vertices without one.
 pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, IoError> {
-    let (path, unit) = (reading.path, reading.unit);
+    let unit = reading.unit.units_per_meter();
     let raw = ply::parse_points(reading, content)?;
-    let in_meters = |p: &Point3<f64>| (p / unit.units_per_meter()).cast::<f32>();
-    let points = raw.vertices.iter().map(in_meters).collect();
+    let points = raw.vertices.iter().map(|p| (p / unit).cast::<f32>());
     // A file has normals for all vertices or for none.
     if raw.normals.iter().all(|n| n.iter().all(|x| x.is_nan())) {
         return Ok(PointCloud {
-            points,
+            points: points.collect(),
             normals: None,
         });
     }
-    let normal = |(number, normal): (usize, &Vector3<f64>)| {
-        let normal = normal.cast::<f32>();
-        let unit = UnitVector3::try_new(normal, 1e-6).filter(|n| n.iter().all(|x| x.is_finite()));
-        unit.ok_or_else(|| {
-            let (x, y, z) = (normal.x, normal.y, normal.z);
-            let found = format!("the normal ({x}, {y}, {z}) of vertex {number}");
-            IoError::new(path, None, found, "finite numbers that are not all 0")
-        })
-    };
-    let normals = raw.normals.iter().enumerate().map(normal);
-    let normals = Some(normals.collect::<Result<_, _>>()?);
-    Ok(PointCloud { points, normals })
+    let normal = |n: &Vector3<f64>| UnitVector3::try_new(n.cast::<f32>(), 1e-6);
+    let normals = raw.normals.iter().map(normal);
+    let is_finite = |n: &UnitVector3<f32>| n.iter().all(|x| x.is_finite());
+    let surfels = points.zip(normals);
+    let surfels = surfels.filter_map(|(p, n)| Some((p, n.filter(is_finite)?)));
+    let (points, normals): (Vec<_>, _) = surfels.unzip();
+    if points.is_empty() {
+        let expected = "finite numbers that are not all 0";
+        return Err(IoError::new(
+            reading.path,
+            None,
+            "no vertex with a normal",
+            expected,
+        ));
+    }
+    Ok(PointCloud {
+        points,
+        normals: Some(normals),
+    })
 }
 
 /// Writes a point cloud as binary little-endian PLY, in meters.
@@ -100,6 +108,27 @@ mod tests {
                 .unwrap()
                 .points
                 .is_empty()
+        );
+    }
+
+    /// Meshes of scans have normals of length 0 where triangles are degenerate.
+    #[test]
+    fn vertices_without_a_normal_are_skipped() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.ply");
+        let header = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                      property float z\nproperty float nx\nproperty float ny\nproperty float nz\n\
+                      end_header\n";
+        let vertices = "0 0 1 0 0 1\n0 0 2 0 1e-7 0\n0 0 3 nan 0 0\n0 0 4 0 2 0\n";
+        std::fs::write(&path, format!("{header}{vertices}")).unwrap();
+        let cloud = read_cloud(&path, LengthUnit::Meters).unwrap();
+        assert_eq!(
+            cloud.points,
+            [Point3::new(0.0, 0.0, 1.0), Point3::new(0.0, 0.0, 4.0)]
+        );
+        assert_eq!(
+            cloud.normals.unwrap(),
+            [Vector3::z_axis(), Vector3::y_axis()]
         );
     }
 

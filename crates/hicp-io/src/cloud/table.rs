@@ -50,12 +50,12 @@ pub(super) fn parse_text(reading: Reading<'_>, text: &str) -> Result<PointCloud,
 pub(super) fn parse_npy(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, IoError> {
     let names = ["points", "xyz", "positions", "cloud", "arr_0"];
     let array = crate::npy::Array::parse(reading.limits, reading.path, content, &names)?;
-    let Some(columns @ 3..) = array
-        .shape
-        .last()
-        .copied()
-        .filter(|_| array.shape.len() > 1)
-    else {
+    // A few rows of many numbers are the coordinates of a transposed array.
+    let columns = match array.shape[..] {
+        [3..=6, 7..=usize::MAX] | [] | [_] => None,
+        [.., columns] => Some(columns),
+    };
+    let Some(columns @ 3..) = columns else {
         let found = format!("an array of the shape {:?}", array.shape);
         return Err(reading.refuse(
             Place::Byte(0),

@@ -94,7 +94,12 @@ impl ReadLimits {
                 distinct.retain(|value| !is_background(*value));
             }
         } else if !pixels.contains(&true) {
-            let found = format!("no pixel that fits {rule:?}");
+            let wanted = match rule {
+                MaskRule::NotZero => "other than 0".to_owned(),
+                MaskRule::AtLeast(value) => format!("of at least {}", shown(value)),
+                MaskRule::Equal(value) => shown(value),
+            };
+            let found = format!("no pixel with a value {wanted}");
             let expected = format!("one of {}", Values::of(values).names());
             return Err(IoError::new(path, None, found, expected));
         }

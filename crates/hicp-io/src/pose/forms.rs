@@ -156,6 +156,17 @@ fn describe(value: &Value) -> String {
             let keys: Vec<_> = members.keys().take(8).map(|key| quote(key)).collect();
             format!("the keys {}", keys.join(", "))
         }
+        (_, Some(numbers)) if numbers.len() == 16 => {
+            let row = numbers[12..].iter().map(f64::to_string);
+            let row = row.collect::<Vec<_>>().join(" ");
+            let column = [3, 7, 11, 15].map(|index| numbers[index]);
+            let hint = if column == [0.0, 0.0, 0.0, 1.0] {
+                ", as if it were transposed"
+            } else {
+                ""
+            };
+            format!("a 4x4 matrix with the last row {row} instead of 0 0 0 1{hint}")
+        }
         (_, Some(numbers)) => format!("{} numbers", numbers.len()),
         (value, None) => quote(&value.to_string().chars().take(80).collect::<String>()),
     }
