@@ -9,6 +9,7 @@ use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::{BoxedStage, Preset, Refiner};
 
 use crate::limits::pipeline_limits;
+use crate::terminal::warn;
 
 /// The options that choose a pipeline.
 #[derive(Clone, Debug, Args)]
@@ -32,6 +33,21 @@ impl PipelineArguments {
     /// Returns the pipeline file, which no output may replace.
     pub(crate) fn file(&self) -> Option<&PathBuf> {
         self.pipeline.as_ref().and_then(Source::file)
+    }
+
+    /// Warns if a color image is given but not used, or the other way around.
+    pub(crate) fn check_colors(&self, given: bool) {
+        match self.pipeline {
+            Some(Source::Preset(Preset::Color)) if !given => {
+                warn("there is no --rgb, so --pipeline color does what auto does");
+            }
+            None if given && !self.overrides.is_empty() => {
+                warn(
+                    "--rgb is not used: with --set, the pipeline is auto, unless --pipeline color is given",
+                );
+            }
+            _ => {}
+        }
     }
 
     /// Reads the file, applies the overrides, and checks that the pipeline builds.

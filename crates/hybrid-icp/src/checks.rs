@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_4;
 
-use hicp_core::{Isometry3, Model, Observation, diameter, se3};
+use hicp_core::{Isometry3, Model, Observation, PinholeCamera, diameter, se3};
 use hicp_icp::Alternative;
 use hicp_score::Flatness;
 use hicp_switch::PAPER_ALPHA;
@@ -62,6 +62,7 @@ const DIAMETER_TOLERANCE: f64 = 0.05;
 #[must_use]
 pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Vec<Warning> {
     let mut warnings = warnings_of_model(model);
+    warnings.extend(warning_of_center(observation.camera()));
     let diameter = model.diameter();
     let rigid = se3::is_finite(init) && (init.rotation.norm() - 1.0).abs() < 1e-6;
     let distance = if rigid {
@@ -261,6 +262,20 @@ fn smallest_side(model: &Model) -> f64 {
     });
     sides.sort_by(f64::total_cmp);
     sides[0] * sides[1]
+}
+
+/// Returns [`Warning::Center`] if the coordinates of the principal point seem to be swapped.
+fn warning_of_center(camera: &PinholeCamera) -> Option<Warning> {
+    let (cx, cy) = (camera.cx(), camera.cy());
+    let (u, v) = (
+        0.5 * f64::from(camera.width()),
+        0.5 * f64::from(camera.height()),
+    );
+    let (off, swapped) = (
+        (cx - u).abs() + (cy - v).abs(),
+        (cy - u).abs() + (cx - v).abs(),
+    );
+    (off > 0.2 * u && swapped < 0.25 * off).then_some(Warning::Center { cx, cy })
 }
 
 /// Returns whether the mask may continue beyond the image.

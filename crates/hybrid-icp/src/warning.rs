@@ -40,6 +40,17 @@ pub enum Warning {
         /// Diameter of the model.
         diameter: f64,
     },
+    /// The principal point is far from the middle of the image, but would be near it if its two
+    /// coordinates were swapped.
+    #[error(
+        "the principal point ({cx}, {cy}) would be near the middle of the image if cx and cy were swapped"
+    )]
+    Center {
+        /// Column of the principal point, pixels.
+        cx: f64,
+        /// Row of the principal point, pixels.
+        cy: f64,
+    },
     /// The object is behind the camera at the initial pose. The pose may also be invalid: not
     /// finite, or with a quaternion that is not of length 1.
     #[error("the object's center is at z = {}, behind the camera, which looks along +z", Meters(*z))]

@@ -343,6 +343,29 @@ fn a_pose_is_judged_without_a_refinement() {
 }
 
 #[test]
+fn a_swapped_principal_point_causes_a_warning() {
+    let model = Model::new(cuboid([0.1, 0.06, 0.04]));
+    let swapped = |cx: f64, cy: f64| {
+        let camera = PinholeCamera::new(300.0, 300.0, cx, cy, 160, 120).unwrap();
+        let depth = DepthImage::from_meters(160, 120, vec![0.5; 160 * 120]).unwrap();
+        let observation = Observation::new(depth, Mask::full(160, 120), camera).unwrap();
+        let warnings = warnings(&model, &observation, &Isometry3::translation(0.0, 0.0, 0.5));
+        warnings.contains(&Warning::Center { cx, cy })
+    };
+    assert!(swapped(58.0, 83.0));
+    // A crop can have its principal point anywhere.
+    for (cx, cy) in [
+        (83.0, 58.0),
+        (79.5, 59.5),
+        (70.0, 70.0),
+        (20.0, 30.0),
+        (-100.0, 300.0),
+    ] {
+        assert!(!swapped(cx, cy), "{cx} {cy}");
+    }
+}
+
+#[test]
 fn a_pose_that_is_not_rigid_causes_a_warning() {
     let model = Model::new(cuboid([0.1, 0.06, 0.04]));
     let depth = DepthImage::from_meters(160, 120, vec![0.5; 160 * 120]).unwrap();

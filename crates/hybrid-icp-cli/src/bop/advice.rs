@@ -24,3 +24,11 @@ pub(crate) fn advice(warning: &Warning, poses: Option<&str>) -> Option<String> {
         _ => None,
     }
 }
+
+/// Returns whether a warning repeats what `wrong_diameters` says of a model.
+pub(crate) fn is_about_diameter(warning: &Warning) -> bool {
+    matches!(
+        warning,
+        Warning::Diameter { .. } | Warning::StatedDiameter { .. }
+    )
+}

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 
 use super::inputs::{ImageFiles, Inputs, MaskOptions, Region};
 use super::job::JobOptions;
@@ -14,6 +14,7 @@ use super::job::JobOptions;
 /// not_found; if nothing was found, there is no pose.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
+#[command(group(ArgGroup::new("region").required(true).args(["mask", "bbox"])))]
 pub(crate) struct Arguments {
     #[command(flatten)]
     files: ImageFiles,
@@ -29,8 +30,6 @@ pub(crate) struct Arguments {
         long,
         value_name = "X,Y,W,H",
         value_parser = bbox,
-        conflicts_with = "mask",
-        required_unless_present = "mask",
         allow_hyphen_values = true
     )]
     bbox: Option<Bbox>,

@@ -13,6 +13,9 @@ use super::colors;
 use crate::limits::limits;
 use crate::options::{finite, positive};
 
+/// Distance of two cameras of one device above which a translation may be in another unit.
+const FARTHEST_CAMERAS_METERS: f64 = 1.0;
+
 /// The files that describe the object and the image.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ImageFiles {
@@ -257,6 +260,13 @@ impl Inputs {
         }
         if let Some(path) = &files.camera_from_depth {
             let pose = limits.read_pose(path, None)?.camera_from_object;
+            let meters = pose.translation.vector.norm();
+            if meters > FARTHEST_CAMERAS_METERS {
+                warnings.push(format!(
+                    "{}: the cameras are {meters:.1} m apart: check that the translation is in m",
+                    path.display()
+                ));
+            }
             depth = register_depth(&depth, &of_depth.camera, &camera, &pose);
         }
         let mask = match (file_mask, &of_mask.distortion) {

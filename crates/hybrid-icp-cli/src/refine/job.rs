@@ -47,7 +47,12 @@ impl JobOptions {
             check_stdout()?;
         }
         self.check_files(inputs)?;
-        let pipeline = self.pipeline.choose(inputs.files.rgb.is_some())?;
+        let color = inputs.files.rgb.is_some();
+        // An estimate compares colors with every pipeline.
+        if inputs.init.is_some() {
+            self.pipeline.check_colors(color);
+        }
+        let pipeline = self.pipeline.choose(color)?;
         let trace_path = self.trace.as_ref();
         let mut header = trace_path
             .map(|_| trace::header(inputs, &pipeline))

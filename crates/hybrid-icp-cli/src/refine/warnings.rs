@@ -65,6 +65,7 @@ pub(super) fn about_inputs(
     let in_words = |warning| match warning {
         Warning::Diameter { .. } => format!("{model}: {warning}, check --model-unit {unit}"),
         Warning::BehindCamera { .. } => format!("{init}: {warning}: {DOCTOR}"),
+        Warning::Center { .. } => format!("{}: {warning}", files.camera.display()),
         Warning::NoDepth => format!(
             "{depth}: {warning} at {depth_scale} mm per unit (depths beyond {MAX_DEPTH_METERS} m count as missing): \
              check --depth-scale and {mask}"

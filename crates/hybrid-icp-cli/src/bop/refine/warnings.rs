@@ -6,7 +6,7 @@ use hicp_bop::{FrameResult, ModelFolder, Models};
 use hicp_io::bop::ResultRow;
 use hybrid_icp::{Warning, warnings_of_model};
 
-use crate::bop::advice::advice;
+use crate::bop::advice::{advice, is_about_diameter};
 use crate::bop::models;
 use crate::terminal::warn;
 
@@ -21,11 +21,7 @@ pub(super) fn about_models(models: &Models, folder: &ModelFolder) {
         diameter.into_iter().for_each(warn);
         for warning in warnings_of_model(model) {
             // One warning about the same number is enough.
-            let same = matches!(
-                warning,
-                Warning::Diameter { .. } | Warning::StatedDiameter { .. }
-            );
-            if diameter.is_none() || !same {
+            if diameter.is_none() || !is_about_diameter(&warning) {
                 warn(format_args!(
                     "object {obj_id}: {warning}: check that {} is in mm",
                     folder.dir().display()

@@ -18,7 +18,7 @@ use hybrid_icp::{Calibration, SequentialEstimator, Warning};
 use self::camera_path::camera_path;
 use self::line::Line;
 use self::tracker::Tracker;
-use super::advice::advice;
+use super::advice::{advice, is_about_diameter};
 use super::follow::FollowOptions;
 use super::statistics::median;
 use super::{faults, models};
@@ -133,7 +133,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (im_id, warnings) = tracker.warnings.unwrap_or_default();
     for warning in warnings {
         // One warning about the same number is enough.
-        if diameter.is_none() || !matches!(warning, Warning::Diameter { .. }) {
+        if diameter.is_none() || !is_about_diameter(&warning) {
             let advice = advice(&warning, Some("--init")).unwrap_or_else(|| match warning {
                 Warning::BehindCamera { .. } => format!("check {}", follow.init.display()),
                 _ => format!("check that {} is in mm", models_dir.display()),
