@@ -178,6 +178,13 @@ impl EvalJob {
             let count = count.and_modify(|count| *count += 1).or_insert(1);
             beyond += usize::from(*count > *wanted);
         }
+        // No camera sees an object that is nearer than 2 cm.
+        let nearest = |row: &ResultRow| row.camera_from_object().translation.vector.norm() < 0.02;
+        if !rows.is_empty() && rows.iter().all(nearest) {
+            warnings.push(format!(
+                "{results}: all translations are below 20 mm: expected the unit mm, they may be in m"
+            ));
+        }
         if let Some(first) = strangers.first() {
             warnings.push(format!(
                 "{results}: {} of {} rows have no target and are ignored; the first is object {} in image {} of scene {}",

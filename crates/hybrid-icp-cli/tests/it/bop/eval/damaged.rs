@@ -76,6 +76,22 @@ fn rows_and_targets_that_do_not_match_are_warned_of() {
 }
 
 #[test]
+fn translations_in_meters_are_warned_of() {
+    let world = dataset();
+    let in_meters = truth_as_results(&world).into_iter().map(|row| {
+        let mut pose = row.camera_from_object();
+        pose.translation.vector *= 1e-3;
+        ResultRow::new(row.scene_id, row.im_id, row.obj_id, pose)
+    });
+    write_results(world.path("in.csv"), &in_meters.collect::<Vec<_>>()).unwrap();
+    let told = eval(&world, &[]).exits(0).err;
+    assert!(
+        told.contains("in.csv: all translations are below 20 mm"),
+        "{told}"
+    );
+}
+
+#[test]
 fn without_targets_every_visible_instance_is_a_target() {
     let world = dataset();
     std::fs::remove_file(world.path("test_targets_bop19.json")).unwrap();
