@@ -174,7 +174,7 @@ fn a_threshold_or_a_value_selects_the_object() {
     let error = read_mask(fixture("mask_labels.png"), MaskRule::Equal(7.0)).unwrap_err();
     let text = error.to_string();
     assert!(
-        text.contains("Equal(7.0)") && text.contains("the values 0, 1 and 3"),
+        text.contains("a value 7,") && text.contains("the values 0, 1 and 3"),
         "{text}"
     );
 }
