@@ -355,6 +355,40 @@ impl PyPipeline {
         )
     }
 
+    /// Judges a pose as it is, for example a fused one or that of another library.
+    ///
+    /// The result has the scores, the confidence and the warnings of a refinement to this pose.
+    /// The call releases the GIL.
+    ///
+    /// Parameters
+    /// ----------
+    /// model : Model
+    ///     The object.
+    /// observation : Observation
+    ///     The image. Its mask shows one instance of the object.
+    /// T_co : array_like, shape (4, 4)
+    ///     The pose, camera from object, meters.
+    ///
+    /// Returns
+    /// -------
+    /// Result
+    ///     Its `T_co` is the given pose, and `outcome` is "kept_initial".
+    fn judge<'py>(
+        &self,
+        py: Python<'py>,
+        model: &Bound<'py, PyModel>,
+        observation: &Bound<'_, PyObservation>,
+        T_co: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let pose = array::motion(T_co, "T_co")?;
+        let (object, observation) = (model.get(), observation.get());
+        let mut refiner = self.take()?;
+        let judged =
+            py.detach(|| refiner.judge(&object.model, &observation.observation, &pose.isometry));
+        self.put_back([refiner]);
+        results::result(model, &pose, &judged, &[], &[])
+    }
+
     /// Refines many poses of one object in one image, on several threads.
     ///
     /// The results have the bits of single calls of `refine`, for any number of threads. The call

@@ -242,3 +242,12 @@ def test_control_c_ends_a_batch(tmp_path):
             assert process.returncode == 0
         finally:
             process.kill()
+
+
+def test_a_pose_is_judged_as_it_is(scene):
+    pipeline = hi.Pipeline()
+    judged = pipeline.judge(scene.model, scene.observation, scene.true)
+    assert np.allclose(judged.T_co, scene.true) and judged.outcome == "kept_initial"
+    assert judged.mve == judged.mve_initial < 0.1 < 0.9 < judged.confidence
+    rough = pipeline.judge(scene.model, scene.observation, scene.rough)
+    assert rough.mve > judged.mve and rough.confidence < judged.confidence

@@ -772,6 +772,27 @@ class Pipeline:
         True
         """
 
+    def judge(self, model: Model, observation: Observation, T_co: npt.ArrayLike) -> Result:
+        """Judges a pose as it is, for example a fused one or that of another library.
+
+        The result has the scores, the confidence and the warnings of a refinement to this pose.
+        The call releases the GIL.
+
+        Parameters
+        ----------
+        model : Model
+            The object.
+        observation : Observation
+            The image. Its mask shows one instance of the object.
+        T_co : array_like, shape (4, 4)
+            The pose, camera from object, meters.
+
+        Returns
+        -------
+        Result
+            Its `T_co` is the given pose, and `outcome` is "kept_initial".
+        """
+
     def refine_batch(self, model: Model, observation: Observation, T_co: npt.ArrayLike, threads: int | None=None) -> list[Result]:
         """Refines many poses of one object in one image, on several threads.
 
