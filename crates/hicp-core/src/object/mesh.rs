@@ -15,14 +15,14 @@ use crate::object::surface_color::SurfaceColor;
 /// 0.5 m at 5000 km: see [`TriMesh::coordinate_step`].
 pub const MAX_COORDINATE_METERS: f32 = 1.0e7;
 
+/// Largest accepted number of vertices, and of triangles.
+pub const MAX_MESH_ELEMENTS: usize = 50_000_000;
+
 /// Returns the distance between adjacent `f32` numbers at the largest coordinate of points, meters.
 pub fn coordinate_step(points: impl Iterator<Item = Point3<f32>>) -> f64 {
     let largest = points.fold(0.0_f32, |most, p| most.max(p.coords.amax()));
     f64::from(largest.next_up()) - f64::from(largest)
 }
-
-/// Largest accepted number of vertices, and of triangles.
-pub const MAX_MESH_ELEMENTS: usize = 50_000_000;
 
 /// The side to which the triangles of a mesh face, if the mesh itself determines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
