@@ -22,6 +22,7 @@ mod pages;
 mod photometric;
 mod pipelines;
 mod pitfalls;
+mod plausibility;
 mod presets;
 mod serialization;
 mod stages;

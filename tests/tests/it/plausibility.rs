@@ -1,0 +1,104 @@
+//! Warnings about inputs, and the confidence in poses that wrong inputs make plausible.
+
+use hicp_sim::{Household, rng};
+use hicp_tests::render;
+use hybrid_icp::core::nalgebra::{Quaternion, UnitQuaternion};
+use hybrid_icp::core::{
+    DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera, TriMesh,
+};
+use hybrid_icp::icp::Verdict;
+use hybrid_icp::{ACCEPTED, Preset, Refiner, Warning, warnings, warnings_of_model};
+
+use crate::numbers::{camera, cuboid};
+
+/// With a wrong diameter or unit, every tolerance is wrong, so nothing can be trusted.
+#[test]
+fn no_pose_is_trusted_if_the_diameter_is_impossible_or_far_above_the_distance() {
+    let model = Household::Iron.model().unwrap();
+    let truth = hicp_sim::object_pose(&mut rng(5), &model.center(), 0.55..0.6, 0.02);
+    let (depth, mask) = render(&model, &camera(), &truth);
+    let observation = Observation::new(depth, mask, camera()).unwrap();
+    let refined = |model: &Model| Refiner::preset(Preset::Auto).refine(model, &observation, &truth);
+    assert!(refined(&model).confidence > ACCEPTED);
+    let stated = |factor: f64| {
+        let diameter = Some(factor * model.diameter());
+        let config = ModelConfig {
+            diameter,
+            ..ModelConfig::default()
+        };
+        Model::with_config(model.mesh().clone(), config)
+    };
+    assert!(refined(&stated(1.04)).confidence > ACCEPTED);
+    assert_eq!(warnings_of_model(&stated(1.04)), []);
+    for factor in [0.3, 3.0, 1000.0] {
+        let model = stated(factor);
+        assert_eq!(refined(&model).confidence, 0.0, "{factor}");
+        let warnings = warnings_of_model(&model);
+        let about_it = |w: &Warning| matches!(w, Warning::StatedDiameter { .. });
+        assert!(warnings.iter().any(about_it), "{factor}: {warnings:?}");
+    }
+    // A mesh in millimeters that was read as meters.
+    let vertices = model.mesh().vertices().iter().map(|p| p * 1000.0).collect();
+    let mesh = TriMesh::new(vertices, model.mesh().triangles().to_vec()).unwrap();
+    assert_eq!(refined(&Model::new(mesh)).confidence, 0.0);
+}
+
+/// A given pose is judged like a refined one.
+#[test]
+fn a_pose_is_judged_without_a_refinement() {
+    let model = Household::Iron.model().unwrap();
+    let truth = hicp_sim::object_pose(&mut rng(5), &model.center(), 0.55..0.6, 0.02);
+    let (depth, mask) = render(&model, &camera(), &truth);
+    let observation = Observation::new(depth, mask, camera()).unwrap();
+    let mut refiner = Refiner::preset(Preset::Auto);
+    let judged = refiner.judge(&model, &observation, &truth);
+    assert_eq!(judged.outcome.camera_from_object, truth);
+    assert!(matches!(judged.outcome.verdict, Verdict::KeptInitial(_)));
+    assert_eq!((judged.mve, judged.mve_initial), (0.0, 0.0));
+    assert!(judged.confidence > ACCEPTED, "{}", judged.confidence);
+    let wrong = Isometry3::translation(0.05, 0.0, 0.0) * truth;
+    let wrong = refiner.judge(&model, &observation, &wrong);
+    assert!(wrong.mve > 0.3 && wrong.confidence < 0.1, "{wrong:?}");
+}
+
+#[test]
+fn a_swapped_principal_point_causes_a_warning() {
+    let model = Model::new(cuboid([0.1, 0.06, 0.04]));
+    let swapped = |cx: f64, cy: f64| {
+        let camera = PinholeCamera::new(300.0, 300.0, cx, cy, 160, 120).unwrap();
+        let depth = DepthImage::from_meters(160, 120, vec![0.5; 160 * 120]).unwrap();
+        let observation = Observation::new(depth, Mask::full(160, 120), camera).unwrap();
+        let warnings = warnings(&model, &observation, &Isometry3::translation(0.0, 0.0, 0.5));
+        warnings.contains(&Warning::Center { cx, cy })
+    };
+    assert!(swapped(58.0, 83.0));
+    // A crop can have its principal point anywhere.
+    for (cx, cy) in [
+        (83.0, 58.0),
+        (79.5, 59.5),
+        (70.0, 70.0),
+        (20.0, 30.0),
+        (-100.0, 300.0),
+    ] {
+        assert!(!swapped(cx, cy), "{cx} {cy}");
+    }
+}
+
+#[test]
+fn a_pose_that_is_not_rigid_causes_a_warning() {
+    let model = Model::new(cuboid([0.1, 0.06, 0.04]));
+    let depth = DepthImage::from_meters(160, 120, vec![0.5; 160 * 120]).unwrap();
+    let observation = Observation::new(depth, Mask::full(160, 120), camera()).unwrap();
+    let mut init = Isometry3::translation(0.0, 0.0, 0.5);
+    let behind = |init: &_| {
+        let warnings = warnings(&model, &observation, init);
+        warnings
+            .iter()
+            .any(|w| matches!(w, Warning::BehindCamera { .. }))
+    };
+    assert!(!behind(&init));
+    for length in [0.0, 2.0, f64::NAN] {
+        init.rotation = UnitQuaternion::new_unchecked(Quaternion::new(length, 0.0, 0.0, 0.0));
+        assert!(behind(&init), "{length}");
+    }
+}
