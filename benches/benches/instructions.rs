@@ -109,7 +109,10 @@ fn image() -> (DepthImage, Mask, PinholeCamera) {
 #[bench::mug(setup = image, config = limit(8_583_081))]
 fn observe(image: (DepthImage, Mask, PinholeCamera)) -> Option<Observation> {
     let (depth, mask, camera) = image;
-    black_box(Observation::new(depth, mask, camera).ok())
+    let observation = Observation::new(depth, mask, camera).ok()?;
+    // The normals are estimated when they are asked for.
+    black_box(observation.n_surfels());
+    Some(observation)
 }
 
 #[library_benchmark]

@@ -50,7 +50,11 @@ fn observe(criterion: &mut Criterion) {
         group.bench_function(id, |bencher| {
             bencher.iter_batched(
                 || (observation.depth().clone(), observation.mask().clone()),
-                |(depth, mask)| Observation::new(depth, mask, *observation.camera()),
+                |(depth, mask)| {
+                    // The normals are estimated when they are asked for.
+                    Observation::new(depth, mask, *observation.camera())
+                        .map(|observation| (observation.n_surfels(), observation))
+                },
                 criterion::BatchSize::LargeInput,
             );
         });

@@ -44,6 +44,8 @@ const STEPS: [&str; 7] = [
     "score",
     "rest",
 ];
+/// The association of surface and silhouette.
+const FIT: &str = "joined";
 const OBSERVE: usize = 0;
 const RENDER: usize = 1;
 const SELECT: usize = 2;
@@ -107,6 +109,14 @@ impl<T: DataAssociation> DataAssociation for Timed<T> {
         pose: &Isometry3<f64>,
         pairs: &mut Correspondences,
     ) {
+        // The first step that needs normals estimates them. The fits need none.
+        if let Some(observation) = context
+            .problem
+            .observation()
+            .filter(|_| self.0.name() != FIT)
+        {
+            timed(OBSERVE, || observation.n_surfels());
+        }
         timed(ASSOCIATE, || self.0.associate(context, source, pose, pairs));
     }
 }

@@ -82,8 +82,8 @@ impl Study {
             let mut context = self.workspace.context(&Problem::new(model, &observation));
             self.scores[index].push(MeanVsd::imperfect_mask().score(&mut context, truth));
             for (_, refiner, results) in &mut self.refiners {
-                let observation = observe()?;
                 let start = Instant::now();
+                let observation = observe()?;
                 let refined = refiner.refine(model, &observation, init);
                 let time = start.elapsed().as_secs_f64() * 1e3;
                 results[index].milliseconds.push(time);

@@ -67,6 +67,7 @@ impl VectorLoop for Project<'_> {
     #[inline(always)]
     fn run(self) {
         let grid = PixelGrid::new(self.observation);
+        let observed = self.observation.surfel_map();
         for (block, first) in self.source.chunks(LANES).zip((0_u32..).step_by(LANES)) {
             // Lanes beyond the last point lie in the camera plane and have no pixel.
             let (mut points, mut normals) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
@@ -80,7 +81,8 @@ impl VectorLoop for Project<'_> {
             let normals = self.mover.vectors(&normals);
             let pixels = grid.pixels(&self.projection, &points);
             for lane in 0..block.len().min(LANES) {
-                let Some(target) = self.observation.surfel(pixels[lane]) else {
+                let target = observed.get(pixels[lane] as usize);
+                let Some(target) = target.filter(|target| target.point.z > 0.0) else {
                     continue;
                 };
                 #[allow(clippy::cast_possible_truncation)] // Below LANES.

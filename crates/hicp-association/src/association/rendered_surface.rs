@@ -18,11 +18,12 @@ use crate::stride::Stride;
 /// The factor t falls from 1 to 0 at the limit (Tukey's biweight). The model is rendered at every
 /// iteration, so hidden parts never pair. Pixels outside of the mask pair, too: masks of detectors
 /// often miss a part of the object, and other surfaces are usually farther away than the limit. If
-/// the observation has no surfel at all, there are no pairs.
+/// less than three pixels are measured inside the mask, there are no pairs.
 ///
 /// `source` is ignored. `source_index` is the index of the pixel in the rendered region, and
-/// `target_index` that of the observed surfel, or [`Pair::UNLISTED`] where the mask has none. All
-/// rendered points of the stride are candidates. Cost: one render, and O(rendered pixels).
+/// `target_index` is [`Pair::UNLISTED`]. So the normals of the image, which cost time, are not
+/// estimated. All rendered points of the stride are candidates. Cost: one render, and O(rendered
+/// pixels).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderedSurface {
     /// Spacing of the rendered pixels to pair.
@@ -64,7 +65,7 @@ impl DataAssociation for RenderedSurface {
         else {
             return;
         };
-        if observation.n_surfels() == 0 {
+        if !observation.has_surface() {
             return;
         }
         let noise = Surroundings::of(observation).noise;
@@ -97,11 +98,9 @@ impl DataAssociation for RenderedSurface {
                     normal: source.normal,
                 };
                 let rendered = region.index(u, v).map_or(Pair::UNLISTED, index);
-                let observed = observation.index_near(u as f32, v as f32);
-                let observed = observed.unwrap_or(Pair::UNLISTED);
                 pairs.push(Pair {
                     weight,
-                    ..Pair::new(rendered, source, observed, target)
+                    ..Pair::new(rendered, source, Pair::UNLISTED, target)
                 });
             }
         }

@@ -1,13 +1,13 @@
 //! The camera's view of the object.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::derived::Derived;
 use crate::id::Id;
 use crate::internal;
 use crate::sensor::camera::PinholeCamera;
 use crate::sensor::image::{ColorImage, DepthImage, ImageError, Mask, check_size};
-use crate::sensor::normals::{DepthPatch, NormalWindow, estimate_normals, n_surfels};
+use crate::sensor::normals::{DepthPatch, NormalWindow, estimate_normals, n_measured, n_surfels};
 use crate::sensor::region::PixelRegion;
 use crate::surfel::Surfel;
 
@@ -24,10 +24,12 @@ use crate::surfel::Surfel;
 /// An empty mask or a depth image of zeros gives an observation without surfels. Refining against
 /// it ends with "no pairs".
 ///
-/// Cost of building one: 5 to 20 ns per pixel inside the mask's bounding box, more with more depth
-/// edges. Pixels outside cost nothing, since the observations of one image share its depth (an
-/// `Arc`). Share an observation between threads and hypotheses, because search trees are built once
-/// per observation, see [`Observation::derived`].
+/// Cost: building one counts the measured pixels inside the mask's bounding box. The surfels are
+/// estimated when they are first asked for, since some refinements never need a normal: 5 to 20 ns
+/// per pixel of the box, more with more depth edges. Pixels outside cost nothing, since the
+/// observations of one image share its depth (an `Arc`). Share an observation between threads and
+/// hypotheses, because surfels and search trees are built once per observation, see
+/// [`Observation::derived`].
 ///
 /// ```
 /// use hicp_core::{DepthImage, Mask, Observation, PinholeCamera};
@@ -46,14 +48,19 @@ pub struct Observation {
     camera: PinholeCamera,
     depth: Arc<DepthImage>,
     color: Option<Arc<ColorImage>>,
-    mask: Mask,
+    mask: Arc<Mask>,
     region: PixelRegion,
     normal_window: NormalWindow,
-    surfels: Vec<Surfel>,
-    n_surfels: usize,
+    surfels: Arc<OnceLock<Surfels>>,
     n_measured: usize,
+    /// The observation whose every n-th surfel this one has, and n.
+    fine: Option<(Box<Observation>, u32)>,
     derived: Derived,
 }
+
+/// The surfels of the region, row-major, and the number of those that are not missing.
+#[derive(Clone, Debug)]
+struct Surfels(Vec<Surfel>, usize);
 
 impl Observation {
     /// Creates an observation from a depth image in meters, a mask and the camera of both.
@@ -115,25 +122,45 @@ impl Observation {
             size,
         )?;
 
-        let patch = DepthPatch::new(&depth, &mask, &camera);
-        let (region, n_measured) = (patch.region, patch.n_measured);
-        // Deviation: pixels without normals leave C: §III-A gives every point of C a normal. Here a
-        // pixel whose neighbors do not determine a plane (a flying pixel, a line) has no surfel. It
-        // is not paired by any metric, and still counts toward the MVE.
-        let (surfels, n_surfels) = estimate_normals(&patch, normal_window);
         Ok(Self {
             id: Id::next(),
             camera,
+            n_measured: n_measured(&depth, &mask),
             depth,
             color: None,
-            mask,
-            region,
+            region: mask.bounding_region(),
+            mask: Arc::new(mask),
             normal_window,
-            surfels,
-            n_surfels,
-            n_measured,
+            surfels: Arc::default(),
+            fine: None,
             derived: Derived::default(),
         })
+    }
+
+    fn surfels_once(&self) -> &Surfels {
+        // Deviation: pixels without normals leave C: §III-A gives every point of C a normal. Here a
+        // pixel whose neighbors do not determine a plane (a flying pixel, a line) has no surfel. It
+        // is not paired by any metric, and still counts toward the MVE.
+        self.surfels.get_or_init(|| {
+            if let Some((fine, factor)) = &self.fine {
+                return fine.every(*factor, &self.region);
+            }
+            let patch = DepthPatch::new(&self.depth, &self.mask, &self.camera);
+            let (surfels, n_surfels) = estimate_normals(&patch, self.normal_window);
+            Surfels(surfels, n_surfels)
+        })
+    }
+
+    /// Returns every `factor`-th surfel in both directions, for a coarse region.
+    fn every(&self, factor: u32, coarse: &PixelRegion) -> Surfels {
+        let fine = self.surfel_map();
+        let surfels: Vec<Surfel> = (coarse.v_min..coarse.v_max)
+            .flat_map(|v| (coarse.u_min..coarse.u_max).map(move |u| (u * factor, v * factor)))
+            .filter_map(|(u, v)| self.region.index(u, v))
+            .map(|index| fine[index])
+            .collect();
+        let n_surfels = n_surfels(&surfels);
+        Surfels(surfels, n_surfels)
     }
 
     /// Returns the observation with the color image of the same camera: pixel (u, v) of both shows
@@ -219,7 +246,25 @@ impl Observation {
     /// Number of pixels that have a surfel.
     #[must_use]
     pub fn n_surfels(&self) -> usize {
-        self.n_surfels
+        self.surfels_once().1
+    }
+
+    /// Whether at least three masked pixels have a depth.
+    ///
+    /// With fewer there is no surfel, and nothing to refine. Cost: O(1); no surfel is estimated.
+    #[must_use]
+    pub fn has_surface(&self) -> bool {
+        self.n_measured >= 3
+    }
+
+    /// The surfels of all pixels of [`Observation::region`], row-major.
+    ///
+    /// The point of a pixel without a surfel has depth 0.
+    ///
+    /// Loops that look up many surfels should ask for this slice once.
+    #[must_use]
+    pub fn surfel_map(&self) -> &[Surfel] {
+        &self.surfels_once().0
     }
 
     /// Number of masked pixels with a measured depth.
@@ -235,7 +280,7 @@ impl Observation {
     pub fn surfel_at(&self, u: u32, v: u32) -> Option<&Surfel> {
         self.region
             .index(u, v)
-            .map(|i| &self.surfels[i])
+            .map(|i| &self.surfel_map()[i])
             .filter(|s| s.point.z > 0.0)
     }
 
@@ -246,7 +291,7 @@ impl Observation {
     #[inline]
     pub fn surfel_near(&self, u: f32, v: f32) -> Option<&Surfel> {
         self.index_near(u, v)
-            .map(|index| &self.surfels[index as usize])
+            .map(|index| &self.surfel_map()[index as usize])
     }
 
     /// Returns the surfel index of the pixel whose square contains the image position (u, v).
@@ -256,6 +301,25 @@ impl Observation {
     #[must_use]
     #[inline]
     pub fn index_near(&self, u: f32, v: f32) -> Option<u32> {
+        self.place_near(u, v)
+            .filter(|index| self.surfel(*index).is_some())
+    }
+
+    /// Returns the depth, in meters, that was measured at the pixel whose square contains the image
+    /// position (u, v).
+    ///
+    /// Returns `None` without a depth, outside of the mask, and for NaN. Unlike surfels, no normal
+    /// is needed.
+    #[must_use]
+    pub fn depth_near(&self, u: f32, v: f32) -> Option<f32> {
+        let (u, v) = self.pixel(self.place_near(u, v)?);
+        self.mask.get(u, v).filter(|masked| *masked)?;
+        self.depth.get(u, v).filter(|z| *z > 0.0)
+    }
+
+    /// Returns the row-major position in the region of the pixel whose square contains (u, v).
+    #[inline]
+    fn place_near(&self, u: f32, v: f32) -> Option<u32> {
         let column = u - self.region.u_min as f32 + 0.5;
         let row = v - self.region.v_min as f32 + 0.5;
         let (width, height) = (self.region.width(), self.region.height());
@@ -263,8 +327,7 @@ impl Observation {
         if column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32 {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             // Floor of a checked value, below 2³².
-            let index = row as u32 * width as u32 + column as u32;
-            self.surfel(index).map(|_| index)
+            Some(row as u32 * width as u32 + column as u32)
         } else {
             None
         }
@@ -276,7 +339,9 @@ impl Observation {
     #[must_use]
     #[inline]
     pub fn surfel(&self, index: u32) -> Option<&Surfel> {
-        self.surfels.get(index as usize).filter(|s| s.point.z > 0.0)
+        self.surfel_map()
+            .get(index as usize)
+            .filter(|s| s.point.z > 0.0)
     }
 
     /// Returns the pixel (u, v) of a surfel's index; see [`Observation::surfel`].
@@ -297,7 +362,7 @@ impl Observation {
     pub fn surfels(&self, stride: u32) -> impl Iterator<Item = (u32, &Surfel)> {
         let stride = stride.max(1);
         let (region, width) = (self.region, self.region.width());
-        let step = stride as usize;
+        let (step, surfels) = (stride as usize, self.surfel_map());
         (region.v_min.next_multiple_of(stride)..region.v_max)
             .step_by(step)
             .flat_map(move |v| {
@@ -306,7 +371,7 @@ impl Observation {
                     .step_by(step)
                     .map(move |u| row + (u - region.u_min) as usize)
             })
-            .map(|index| (internal::index(index), &self.surfels[index]))
+            .map(|index| (internal::index(index), &surfels[index]))
             .filter(|(_, s)| s.point.z > 0.0)
     }
 
@@ -347,11 +412,6 @@ impl Observation {
             u_max: self.region.u_max.div_ceil(factor),
             v_max: self.region.v_max.div_ceil(factor),
         };
-        let surfels: Vec<Surfel> = (region.v_min..region.v_max)
-            .flat_map(|v| (region.u_min..region.u_max).map(move |u| (u * factor, v * factor)))
-            .filter_map(|(u, v)| self.region.index(u, v))
-            .map(|index| self.surfels[index])
-            .collect();
         let depth = pixels().map(|i| self.depth.pixels()[i]).collect();
         let mask: Vec<bool> = pixels().map(|i| self.mask.pixels()[i]).collect();
         let measured = |i: &usize| self.mask.pixels()[*i] && self.depth.pixels()[*i] > 0.0;
@@ -369,12 +429,19 @@ impl Observation {
             depth: Arc::new(depth),
             // Color is used at full resolution only.
             color: None,
-            mask,
+            mask: Arc::new(mask),
             region,
             normal_window: self.normal_window,
-            n_surfels: n_surfels(&surfels),
-            surfels,
+            surfels: Arc::default(),
             n_measured,
+            // Without its derived values, of which this observation is one.
+            fine: Some((
+                Box::new(Self {
+                    derived: Derived::default(),
+                    ..self.clone()
+                }),
+                factor,
+            )),
             derived: Derived::default(),
         }
     }

@@ -226,6 +226,49 @@ fn surfels_of_a_stride_are_the_brute_force_grid_in_row_major_order() {
     }
 }
 
+#[test]
+fn surfels_are_estimated_once_for_an_observation_and_its_clones() {
+    let observation = ragged(40, 30, 35);
+    let clone = observation.clone();
+    let maps = std::thread::scope(|scope| {
+        [&observation, &clone]
+            .map(|seen| scope.spawn(|| seen.surfel_map().as_ptr() as usize))
+            .map(|thread| thread.join().unwrap())
+    });
+    assert_eq!(maps[0], maps[1]);
+    let present = observation.surfel_map().iter().filter(|s| s.point.z > 0.0);
+    assert_eq!(present.count(), observation.n_surfels());
+    assert_eq!(observation.surfel_map().len(), observation.region().area());
+}
+
+#[test]
+fn the_depth_near_a_position_is_that_of_its_masked_pixel() {
+    let observation = ragged(40, 30, 36);
+    for v in 0..30_u16 {
+        for u in 0..40_u16 {
+            let (column, row) = (u32::from(u), u32::from(v));
+            let masked = observation.mask().get(column, row) == Some(true);
+            let measured = observation.depth().get(column, row).filter(|z| *z > 0.0);
+            let near = observation.depth_near(f32::from(u) + 0.4, f32::from(v) - 0.4);
+            assert_eq!(near, measured.filter(|_| masked), "({u}, {v})");
+        }
+    }
+    for (u, v) in [(f32::NAN, 3.0), (-0.6, 3.0), (39.6, 3.0), (3.0, 1e30)] {
+        assert_eq!(observation.depth_near(u, v), None);
+    }
+}
+
+#[test]
+fn fewer_than_three_measured_pixels_are_no_surface() {
+    for count in 0..5 {
+        let mask = Mask::new(4, 3, (0..12).map(|pixel| pixel < count).collect()).unwrap();
+        let wall = DepthImage::from_meters(4, 3, vec![0.5; 12]).unwrap();
+        let observation = Observation::new(wall, mask, camera(4, 3)).unwrap();
+        assert_eq!(observation.has_surface(), count >= 3);
+        assert!(observation.has_surface() || observation.n_surfels() == 0);
+    }
+}
+
 /// Pixel squares are half-open and extend half a pixel to every side: floor(x + ½), computed in
 /// f64.
 fn reference(observation: &Observation, u: f32, v: f32) -> Option<hicp_core::Surfel> {

@@ -289,7 +289,7 @@ impl<S: Stage, P: Stage, C: Score> Stage for ColorChoice<S, P, C> {
     ) -> Outcome {
         let outcome = self.stage.run(problem, init, session);
         let colored = |(model, observation): &(&Model, &Observation)| {
-            let seen = observation.n_surfels() > 0 && observation.color().is_some();
+            let seen = observation.has_surface() && observation.color().is_some();
             seen && self.color.can_tell(model)
         };
         let Some((model, _)) = problem.sides().filter(colored) else {

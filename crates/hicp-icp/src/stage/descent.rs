@@ -59,7 +59,7 @@ impl<C: Score> Stage for Descent<C> {
             return Outcome::kept(init, Termination::Unsupported(part));
         }
         let kept = Outcome::kept(init, Termination::ScoreNotImproved);
-        let seen = problem.sides().filter(|(_, o)| o.n_surfels() > 0);
+        let seen = problem.sides().filter(|(_, o)| o.has_surface());
         let Some((model, _)) = seen else {
             return kept;
         };

@@ -20,7 +20,7 @@ use std::ops::Range;
 
 use edges::Edges;
 use gated::FitGated;
-pub(crate) use patch::DepthPatch;
+pub(crate) use patch::{DepthPatch, n_measured};
 use plane_fits::PlaneFits;
 use row::{Rays, Row};
 pub use size::NormalWindow;

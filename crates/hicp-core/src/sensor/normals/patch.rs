@@ -16,8 +16,6 @@ pub(super) const MIN_DEPTH_METERS: f32 = 1e-4;
 pub(crate) struct DepthPatch<'a> {
     pub(crate) region: PixelRegion,
     pub(super) camera: &'a PinholeCamera,
-    /// Number of used pixels.
-    pub(crate) n_measured: usize,
     /// Followed by a block of zeros.
     depth: Vec<f32>,
 }
@@ -27,11 +25,11 @@ impl<'a> DepthPatch<'a> {
     pub(crate) fn new(depth: &DepthImage, mask: &Mask, camera: &'a PinholeCamera) -> Self {
         let region = mask.bounding_region();
         let (width, image_width) = (region.width(), depth.width() as usize);
-        let (mut patch, mut n_measured) = (vec![0.0; region.area() + LANES], 0);
+        let mut patch = vec![0.0; region.area() + LANES];
         let rows = patch[..region.area()].chunks_exact_mut(width.max(1));
         for (v, to) in (region.v_min as usize..).zip(rows) {
             let columns = v * image_width + region.u_min as usize..;
-            n_measured += vectorized(CopyMasked {
+            vectorized(CopyMasked {
                 depth: &depth.pixels()[columns.clone()],
                 mask: &mask.pixels()[columns],
                 to,
@@ -40,7 +38,6 @@ impl<'a> DepthPatch<'a> {
         Self {
             region,
             camera,
-            n_measured,
             depth: patch,
         }
     }
@@ -65,7 +62,7 @@ impl<'a> DepthPatch<'a> {
     }
 }
 
-/// The loop that copies the masked pixels of a row, and counts those with depth.
+/// The loop that copies the masked pixels of a row.
 struct CopyMasked<'a> {
     depth: &'a [f32],
     mask: &'a [bool],
@@ -73,15 +70,46 @@ struct CopyMasked<'a> {
 }
 
 impl VectorLoop for CopyMasked<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for ((to, z), masked) in self.to.iter_mut().zip(self.depth).zip(self.mask) {
+            *to = if *masked { *z } else { 0.0 };
+        }
+    }
+}
+
+/// Returns the number of masked pixels with depth.
+pub(crate) fn n_measured(depth: &DepthImage, mask: &Mask) -> usize {
+    let (region, image_width) = (mask.bounding_region(), depth.width() as usize);
+    let (first, end) = (region.u_min as usize, region.u_max as usize);
+    (region.v_min as usize..region.v_max as usize)
+        .map(|v| v * image_width)
+        .map(|row| {
+            vectorized(CountMeasured {
+                depth: &depth.pixels()[row + first..row + end],
+                mask: &mask.pixels()[row + first..row + end],
+            })
+        })
+        .sum()
+}
+
+/// The loop that counts the measured pixels of a row.
+struct CountMeasured<'a> {
+    depth: &'a [f32],
+    mask: &'a [bool],
+}
+
+impl VectorLoop for CountMeasured<'_> {
     type Output = usize;
 
     #[inline(always)]
     fn run(self) -> usize {
         // In 32 bits, more counters fit into a vector.
         let mut n_measured = 0_u32;
-        for ((to, z), masked) in self.to.iter_mut().zip(self.depth).zip(self.mask) {
-            *to = if *masked { *z } else { 0.0 };
-            n_measured += u32::from(*to > 0.0);
+        for (z, masked) in self.depth.iter().zip(self.mask) {
+            n_measured += u32::from(*masked & (*z > 0.0));
         }
         n_measured as usize
     }

@@ -398,7 +398,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
         self.found.clear();
         self.explored.clear();
         session.workspace.alternatives.clear();
-        let seen = |(_, observation): (_, &Observation)| observation.n_surfels() > 0;
+        let seen = |(_, observation): (_, &Observation)| observation.has_surface();
         let Some((model, _)) = problem.sides().filter(|sides| seen(*sides)) else {
             return local;
         };

@@ -111,8 +111,8 @@ impl NearSymmetries {
                 continue;
             };
             #[allow(clippy::cast_possible_truncation)] // f32 is the precision of images.
-            let surfel = observation.surfel_near(pixel.x as f32, pixel.y as f32);
-            if surfel.is_some_and(|s| (f64::from(s.point.z) - point.z).abs() < tolerance) {
+            let depth = observation.depth_near(pixel.x as f32, pixel.y as f32);
+            if depth.is_some_and(|z| (f64::from(z) - point.z).abs() < tolerance) {
                 seen[index / 64] |= 1 << (index % 64);
             }
         }
