@@ -61,7 +61,7 @@ pub use fusion::{Fusion, fuse};
 pub use gate::{CHI_SQUARED_6_999, Gate, Gated};
 pub use hicp_core;
 pub use information::MIN_STANDARD_DEVIATION;
-pub use method::{BoxedFuser, FusionMethod};
+pub use method::{BoxedFuser, FusionMethod, IntoFuser};
 pub use motion::{CameraMotion, Transport};
 pub use recursive::RecursiveFuser;
 pub use shared_error::SharedError;

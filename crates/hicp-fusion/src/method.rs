@@ -100,6 +100,32 @@ impl FusionMethod {
     }
 }
 
+/// A way to fuse that is not tied to an object yet: a method of the paper, or any [`Fuser`].
+///
+/// ```
+/// use hicp_fusion::{Fuser, FuserConfig, FusionMethod, IntoFuser, LastEstimate, Transport};
+/// let config = FuserConfig::default();
+/// let method = FusionMethod::LastEstimate.into_fuser(config);
+/// let own = LastEstimate::new(Transport::Adjoint).into_fuser(config);
+/// assert_eq!(method.name(), own.name());
+/// ```
+pub trait IntoFuser {
+    /// Returns the fuser. A method is built with `config`; a fuser is returned as it is.
+    fn into_fuser(self, config: FuserConfig) -> BoxedFuser;
+}
+
+impl IntoFuser for FusionMethod {
+    fn into_fuser(self, config: FuserConfig) -> BoxedFuser {
+        self.build(config)
+    }
+}
+
+impl<F: Fuser + Send + 'static> IntoFuser for F {
+    fn into_fuser(self, _: FuserConfig) -> BoxedFuser {
+        Box::new(self)
+    }
+}
+
 impl std::fmt::Display for FusionMethod {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())

@@ -12,7 +12,7 @@ use hybrid_icp::fusion::{
     CameraMotion, Failure, Fuser, Fusion, PoseEstimate, Solution, Transport, Update,
 };
 use hybrid_icp::raster::render_depth_image;
-use hybrid_icp::{Preset, SequentialConfig, SequentialEstimator};
+use hybrid_icp::{Preset, SequentialEstimator};
 
 mod scene;
 
@@ -75,12 +75,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         held: None,
         fusion: Fusion::default(),
     };
-    let mut estimator = SequentialEstimator::new(
-        Preset::Hybrid.build(),
-        fuser,
-        SequentialConfig::default(),
-        &given.detected,
-    )?;
+    // With the covariances and the gate of an object; `SequentialEstimator::new` has neither.
+    let mut estimator =
+        SequentialEstimator::for_object(Preset::Hybrid.build(), fuser, &model, &given.detected)?;
     // The camera moves around the object by 5 mm and half a degree per image.
     let motion = CameraMotion::new(se3::exp(&Vector6::new(0.005, 0.0, 0.0, 0.0, 0.009, 0.0)))?;
     let (mut rng, mut truth, mut moved) = (rng(2), given.truth, CameraMotion::none());

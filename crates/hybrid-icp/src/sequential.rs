@@ -3,7 +3,7 @@
 use hicp_core::{Isometry3, Matrix6, Model, Observation, Problem};
 use hicp_fusion::{
     BoxedFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
-    Gated, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance,
+    Gated, IntoFuser, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance,
 };
 use hicp_icp::{
     BoxedStage, Observer, Outcome, Quality, Session, Stage, Termination, Verdict, Workspace,
@@ -84,6 +84,7 @@ impl SequentialEstimator {
 
     /// Creates an estimator for an object.
     ///
+    /// `fuser` is a [`FusionMethod`], or any [`Fuser`], which receives what passes the gate.
     /// Uncertainty is the MVE around the object's center, and rotations count by its radius.
     /// Estimates with an MVE above 0.4 are skipped, and symmetric poses are brought together.
     ///
@@ -93,7 +94,7 @@ impl SequentialEstimator {
     /// range.
     pub fn for_object(
         stage: impl Stage + Send + 'static,
-        method: FusionMethod,
+        fuser: impl IntoFuser,
         model: &Model,
         init: &Isometry3<f64>,
     ) -> Result<Self, FusionError> {
@@ -103,7 +104,7 @@ impl SequentialEstimator {
             max_mahalanobis_squared: None,
             ..Gate::default()
         };
-        let gated = gated(method, unit, gate)?;
+        let gated = gated(fuser, unit, gate)?;
         let mve = MveCovariance {
             unit,
             ..MveCovariance::default()
@@ -122,13 +123,13 @@ impl SequentialEstimator {
     /// calibration is out of range.
     pub fn calibrated(
         stage: impl Stage + Send + 'static,
-        method: FusionMethod,
+        fuser: impl IntoFuser,
         calibration: &Calibration,
         model: &Model,
         init: &Isometry3<f64>,
     ) -> Result<Self, FusionError> {
         let unit = UnitCovariance::about_object(model.center(), model.radius())?;
-        let gated = gated(method, unit, calibration.gate)?;
+        let gated = gated(fuser, unit, calibration.gate)?;
         let fuser = SharedError::new(gated, unit, calibration.shared)?;
         let covariance = CovarianceModel::Inflated(calibration.covariance(unit));
         Self::of_object(stage, fuser, covariance, model, init)
@@ -284,9 +285,9 @@ impl SequentialEstimator {
     }
 }
 
-/// Puts a method behind the gate of an object.
+/// Puts a fuser behind the gate of an object.
 fn gated(
-    method: FusionMethod,
+    fuser: impl IntoFuser,
     unit: UnitCovariance,
     gate: Gate,
 ) -> Result<Gated<BoxedFuser>, FusionError> {
@@ -294,7 +295,7 @@ fn gated(
         unit,
         ..FuserConfig::default()
     };
-    Gated::new(method.build(config), gate)
+    Gated::new(fuser.into_fuser(config), gate)
 }
 
 impl std::fmt::Debug for SequentialEstimator {
