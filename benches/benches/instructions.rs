@@ -88,7 +88,7 @@ fn draw(case: &Case, rasterizer: &mut Rasterizer, view: &mut RenderedView) {
 }
 
 #[library_benchmark]
-#[bench::mug(setup = raster, config = limit(2_019_129))]
+#[bench::mug(setup = raster, config = limit(2_151_650))]
 fn render(state: (Case, Rasterizer, RenderedView)) -> (Case, Rasterizer, RenderedView) {
     let (case, mut rasterizer, mut view) = state;
     draw(&case, &mut rasterizer, &mut view);
@@ -106,7 +106,7 @@ fn image() -> (DepthImage, Mask, PinholeCamera) {
 }
 
 #[library_benchmark]
-#[bench::mug(setup = image, config = limit(8_583_081))]
+#[bench::mug(setup = image, config = limit(6_810_508))]
 fn observe(image: (DepthImage, Mask, PinholeCamera)) -> Option<Observation> {
     let (depth, mask, camera) = image;
     let observation = Observation::new(depth, mask, camera).ok()?;
@@ -116,7 +116,7 @@ fn observe(image: (DepthImage, Mask, PinholeCamera)) -> Option<Observation> {
 }
 
 #[library_benchmark]
-#[bench::visible_surface_mug(setup = projective, config = limit(554_592))]
+#[bench::visible_surface_mug(setup = projective, config = limit(315_626))]
 fn select(mut ready: Ready) -> Ready {
     let problem = Problem::new(&ready.case.scene.model, &ready.case.scene.observation);
     ready.source.clear();
@@ -134,35 +134,35 @@ fn pair(ready: &mut Ready, association: &mut dyn DataAssociation) {
 }
 
 #[library_benchmark]
-#[bench::mug(setup = projective, config = limit(226_202))]
+#[bench::mug(setup = projective, config = limit(192_363))]
 fn associate_projective(mut ready: Ready) -> Ready {
     pair(&mut ready, &mut Projective);
     black_box(ready)
 }
 
 #[library_benchmark]
-#[bench::mug(setup = nearest, config = limit(1_740_511))]
+#[bench::mug(setup = nearest, config = limit(1_491_872))]
 fn associate_nearest_neighbor(mut ready: Ready) -> Ready {
     pair(&mut ready, &mut NearestNeighbor::default());
     black_box(ready)
 }
 
 #[library_benchmark]
-#[bench::mug(setup = projective, config = limit(113_012))]
+#[bench::mug(setup = projective, config = limit(169_827))]
 fn metric_point_to_point(ready: Ready) -> (Ready, Option<Step>) {
     let step = PointToPoint.minimize(&Iteration::default(), &ready.pairs);
     black_box((ready, step))
 }
 
 #[library_benchmark]
-#[bench::mug(setup = projective, config = limit(196_330))]
+#[bench::mug(setup = projective, config = limit(160_201))]
 fn metric_point_to_plane(ready: Ready) -> (Ready, Option<Step>) {
     let step = PointToPlane.minimize(&Iteration::default(), &ready.pairs);
     black_box((ready, step))
 }
 
 #[library_benchmark]
-#[bench::mve_mug(setup = projective, config = limit(654_712))]
+#[bench::mve_mug(setup = projective, config = limit(364_026))]
 fn score(mut ready: Ready) -> (Ready, f64) {
     let problem = Problem::new(&ready.case.scene.model, &ready.case.scene.observation);
     let mut context = ready.workspace.context(&problem);
@@ -180,7 +180,7 @@ fn warm() -> (Case, Refiner) {
 }
 
 #[library_benchmark]
-#[bench::hybrid_mug(setup = warm, config = limit(16_977_485))]
+#[bench::hybrid_mug(setup = warm, config = limit(14_237_107))]
 fn pipeline(state: (Case, Refiner)) -> (Case, Refiner, Refinement) {
     let (case, mut refiner) = state;
     let refined = refiner.refine(&case.scene.model, &case.scene.observation, &case.init);
