@@ -148,14 +148,14 @@ fn associate_nearest_neighbor(mut ready: Ready) -> Ready {
 }
 
 #[library_benchmark]
-#[bench::mug(setup = projective, config = limit(169_827))]
+#[bench::mug(setup = projective, config = limit(112_233))]
 fn metric_point_to_point(ready: Ready) -> (Ready, Option<Step>) {
     let step = PointToPoint.minimize(&Iteration::default(), &ready.pairs);
     black_box((ready, step))
 }
 
 #[library_benchmark]
-#[bench::mug(setup = projective, config = limit(160_201))]
+#[bench::mug(setup = projective, config = limit(159_127))]
 fn metric_point_to_plane(ready: Ready) -> (Ready, Option<Step>) {
     let step = PointToPlane.minimize(&Iteration::default(), &ready.pairs);
     black_box((ready, step))
@@ -180,7 +180,7 @@ fn warm() -> (Case, Refiner) {
 }
 
 #[library_benchmark]
-#[bench::hybrid_mug(setup = warm, config = limit(14_237_107))]
+#[bench::hybrid_mug(setup = warm, config = limit(13_982_721))]
 fn pipeline(state: (Case, Refiner)) -> (Case, Refiner, Refinement) {
     let (case, mut refiner) = state;
     let refined = refiner.refine(&case.scene.model, &case.scene.observation, &case.init);

@@ -48,12 +48,15 @@ impl PairBlock {
 /// Adds Σ a b over a block to the lanes of a sum.
 #[inline(always)]
 pub(crate) fn add_products(sum: &mut [f64; LANES], a: &Column, b: &Column) {
-    let (a, b) = (a.as_chunks::<LANES>().0, b.as_chunks::<LANES>().0);
-    for (a, b) in a.iter().zip(b) {
+    // With a local sum and offsets, the compiler uses half of the instructions that zipped chunks
+    // need.
+    let mut total = *sum;
+    for first in (0..BLOCK).step_by(LANES) {
         for lane in 0..LANES {
-            sum[lane] += a[lane] * b[lane];
+            total[lane] += a[first + lane] * b[first + lane];
         }
     }
+    *sum = total;
 }
 
 /// Returns the product of two columns.
