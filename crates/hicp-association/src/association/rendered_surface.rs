@@ -18,7 +18,7 @@ use crate::stride::Stride;
 /// The factor t falls from 1 to 0 at the limit (Tukey's biweight). The model is rendered at every
 /// iteration, so hidden parts never pair. Pixels outside of the mask pair, too: masks of detectors
 /// often miss a part of the object, and other surfaces are usually farther away than the limit. If
-/// less than three pixels are measured inside the mask, there are no pairs.
+/// fewer than three pixels are measured inside the mask, there are no pairs.
 ///
 /// `source` is ignored. `source_index` is the index of the pixel in the rendered region, and
 /// `target_index` is [`Pair::UNLISTED`]. So the normals of the image, which cost time, are not

@@ -249,7 +249,7 @@ impl Observation {
         self.surfels_once().1
     }
 
-    /// Whether at least three masked pixels have a depth.
+    /// Returns true if at least three masked pixels have a depth.
     ///
     /// With fewer there is no surfel, and nothing to refine. Cost: O(1); no surfel is estimated.
     #[must_use]

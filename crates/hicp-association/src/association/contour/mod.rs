@@ -31,7 +31,7 @@ use split::Split;
 /// dilated by a constant width is therefore as good as an exact one, and a box has no influence.
 /// Pixels that something hides are no evidence, so a border that is hidden has no pair. A pixel
 /// without depth is weak evidence of background outside of the mask, and none inside of it. If the
-/// observation has less than three measured pixels, there are no pairs.
+/// observation has fewer than three measured pixels, there are no pairs.
 ///
 /// Use it with [`RenderedSurface`](crate::RenderedSurface) as a tuple, point-to-plane and the
 /// selection `()`. The normals of a pair lie in the image plane of the silhouette. Weights are the
