@@ -15,7 +15,7 @@
 //!
 //! **Should you use this crate?** Yes: its modules are the crates below it, so one dependency is
 //! enough. Depend on one of those alone if you write a component and want few dependencies.
-//! `hicp-io` reads files (meshes, PNGs, BOP datasets).
+//! `hicp-io` reads files (meshes, point clouds, images, BOP datasets).
 //!
 //! # Compose your own
 //!
