@@ -53,7 +53,7 @@
 //! | step over all pairs | [`Minimize`](metric::Minimize) | [`Robust`](metric::Robust), [`PosePrior`](metric::PosePrior), [`LevenbergMarquardt`](metric::LevenbergMarquardt), … | |
 //! | when a stage ends | [`StopRule`](icp::StopRule) | [`Divergence`](icp::Divergence), [`Convergence`](icp::Convergence), [`SmallMotion`](icp::SmallMotion), … | `07_own_stop_rule` |
 //! | pose to better pose | [`Stage`](icp::Stage) | [`Icp`](icp::Icp), [`Cascade`](icp::Cascade), [`Repeat`](icp::Repeat), [`Guard`](icp::Guard), … | `12_own_stage` |
-//! | how well a pose fits | [`Score`](score::Score) | [`MeanVsd`](score::MeanVsd), [`SampledMve`](score::SampledMve), [`Vsd`](score::Vsd) | `11_own_score` |
+//! | how badly a pose fits (0 is perfect) | [`Score`](score::Score) | [`MeanVsd`](score::MeanVsd), [`SampledMve`](score::SampledMve), [`Vsd`](score::Vsd) | `11_own_score` |
 //! | which stage runs | [`Switcher`](switch::Switcher) | [`Threshold`](switch::Threshold), [`Thresholds`](switch::Thresholds) | `08_own_switcher` |
 //! | fusion of estimates | [`Fuser`](fusion::Fuser) | the paper's six methods ([`FusionMethod`](fusion::FusionMethod)), [`Gated`](fusion::Gated), … | `14_own_fuser` |
 //! | depth of a model | [`Renderer`](core::Renderer) | [`Rasterizer`](raster::Rasterizer) | `13_own_renderer` |

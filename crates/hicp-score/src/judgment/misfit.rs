@@ -18,7 +18,7 @@ const PARTS: usize = 8;
 /// Fewest compared cells of a part.
 const LEAST_CELLS: u32 = 8;
 
-/// The disagreement of a pose with the image, as far as the noise does not explain it.
+/// The disagreement of a pose with the image that the noise does not explain.
 ///
 /// [`Evidence`](crate::Evidence) counts pixels within fixed tolerances. Here the tolerances grow
 /// with the noise, which is estimated from neighboring pixels: at a right pose every number but
