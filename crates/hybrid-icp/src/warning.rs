@@ -149,9 +149,14 @@ pub enum Warning {
     /// Another pose explains the image as well as the returned one.
     ///
     /// It is not equivalent by a declared symmetry.
-    #[error("ambiguous: 2 poses within {:.2}, {rotation_degrees:.0}° apart", within(*gap))]
+    #[error(
+        "ambiguous: 2 poses within {:.2}, {rotation_degrees:.0}° apart{}",
+        within(*gap),
+        if *gap < 0.0 { ", and the other has the lower score" } else { "" }
+    )]
     Ambiguous {
-        /// Score of the other pose minus that of the returned one.
+        /// Score of the other pose minus that of the returned one: negative if the other explains
+        /// the image better, but not clearly.
         gap: f64,
         /// Angle between the two, up to declared symmetries, degrees.
         rotation_degrees: f64,
@@ -161,7 +166,7 @@ pub enum Warning {
     ///
     /// The mask may show a wall, a table, a box, or something that the sensor cannot measure.
     #[error(
-        "the surface inside the mask is flat to within {}, that of the model at the pose only to within {}, and {} away from it: what is there may be another object",
+        "the mask may show a wall or a table: the measured surface is flat to {}, but the model's surface there only to {}, and they are {} apart",
         Meters(flatness.measured.max(FINEST)),
         Meters(flatness.rendered),
         Meters(flatness.residual)

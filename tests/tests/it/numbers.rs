@@ -332,13 +332,13 @@ fn results_with_bad_scores_cause_a_warning() {
     // No depth image is as flat as rounding allows, so the message states at least 1 mm.
     let exact = Flatness::new(0.01, 1e-16, 0.0123, 0.2);
     let found = warnings_of_result(half, nearly, half, Some(exact));
-    assert!(found[0].to_string().contains("flat to within 0.0010 m"));
+    assert!(found[0].to_string().contains("flat to 0.0010 m"));
     let found = warnings_of_result(half, nearly, half, Some(flatness));
     assert_eq!(found, [Warning::Flat { flatness }]);
     assert_eq!(
         found[0].to_string(),
-        "the surface inside the mask is flat to within 0.0020 m, that of the model at the pose only to within 0.0123 m, and 0.0100 m away from it: \
-         what is there may be another object"
+        "the mask may show a wall or a table: the measured surface is flat to 0.0020 m, but the model's surface there only to 0.0123 m, and they \
+         are 0.0100 m apart"
     );
     let found = warnings_of_result(0.2, 0.3, half, None);
     assert_eq!(

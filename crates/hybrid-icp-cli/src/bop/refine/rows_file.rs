@@ -99,8 +99,8 @@ mod tests {
              1,2,5,0,refined,0.5,0.25,0.75,\n\
              1,2,6,1,kept: no mask of the object,,,,\n\
              1,2,7,2,refined,0.95,0.1,0.75,\"the initial pose explained nothing of the mask (MVE 0.950): what was found there (MVE 0.100) may be \
-             another object; the surface inside the mask is flat to within 0.0010 m, that of the model at the pose only to within 0.0100 m, and \
-             0.0100 m away from it: what is there may be another object\"\n"
+             another object; the mask may show a wall or a table: the measured surface is flat to 0.0010 m, but the model's surface there only to \
+             0.0100 m, and they are 0.0100 m apart\"\n"
         );
     }
 }
