@@ -268,9 +268,9 @@ pub(crate) fn basin() -> Drawn {
         }
     }
     let axes = Axes {
-        title: "Starts that end within 5° and 5 mm of the truth, %",
+        title: "Starts, all 20 mm off, that end within 5° and 5 mm of the truth",
         x: (
-            "initial rotation error, degrees (and 20 mm)",
+            "initial rotation error, degrees",
             0.0..180.0,
             vec![0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0],
         ),

@@ -4,7 +4,7 @@ use std::error::Error;
 
 use hicp_sim::{Household, perturb, rng, rotation};
 use hybrid_icp::core::{Isometry3, Observation, UnitQuaternion, Vector3};
-use hybrid_icp::{Preset, Refinement, Refiner};
+use hybrid_icp::{ACCEPTED, Preset, Refinement, Refiner};
 
 use crate::scene::{Crop, Placed, Scene, close, outline};
 use crate::svg::{AFTER, Anchor, BAD, BEFORE, GOOD, GRAY, INK, Place, Svg};
@@ -77,15 +77,15 @@ impl Try {
         let height = width * f64::from(crop.3) / f64::from(crop.2);
         let y = at.1 + height;
         svg.text((at.0, y + 24.0), 15, INK, Anchor::Start, title);
-        let accepted = refined.mve < 0.3 && refined.warnings().is_empty();
-        let (word, color) = if accepted {
+        let mve = format!("MVE {:.2} → {:.2}", refined.mve_initial, refined.mve);
+        svg.text((at.0, y + 46.0), 14, GRAY, Anchor::Start, &mve);
+        let (word, color) = if refined.confidence >= ACCEPTED {
             ("accepted", GOOD)
         } else {
             ("not accepted", BAD)
         };
-        let mve = format!("MVE {:.2} → {:.2}", refined.mve_initial, refined.mve);
-        svg.text((at.0, y + 46.0), 14, GRAY, Anchor::Start, &mve);
-        svg.text((at.0 + width, y + 46.0), 14, color, Anchor::End, word);
+        let judged = format!("confidence {:.2}: {word}", refined.confidence);
+        svg.text((at.0, y + 68.0), 14, color, Anchor::Start, &judged);
         Ok(())
     }
 
@@ -159,7 +159,7 @@ const COLUMNS: ([f64; 3], f64) = ([10.0, 300.0, 590.0], 270.0);
 
 pub(crate) fn successes() -> Drawn {
     use Household::{Bracket, Camera, Iron, Mug, Pan};
-    let mut svg = Svg::new(870.0, 320.0);
+    let mut svg = Svg::new(870.0, 342.0);
     key(&mut svg, (10.0, 20.0));
     let (columns, width) = COLUMNS;
     let alone = |object| Scene::on_a_table(0.6, &[(object, 0.0, 0.0, 120.0)]);
@@ -201,7 +201,7 @@ pub(crate) fn successes() -> Drawn {
 
 pub(crate) fn failures() -> Drawn {
     use Household::{Bottle, Can, Iron, Mug};
-    let mut svg = Svg::new(870.0, 320.0);
+    let mut svg = Svg::new(870.0, 342.0);
     key(&mut svg, (10.0, 20.0));
     let (columns, width) = COLUMNS;
     let crop = (170, 120, 300, 240);
