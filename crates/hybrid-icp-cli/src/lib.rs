@@ -34,7 +34,8 @@ use clap::{Parser, Subcommand};
 ///
 /// A detector provides a segmentation mask and a rough pose. This program aligns the object's mesh
 /// with the measured depth. It scores the result by the mean VSD estimate (MVE), from 0 (the pose
-/// explains every pixel) to 1 (it explains none). Do not trust poses with an MVE of 0.4 or more.
+/// explains every pixel) to 1 (it explains none). It also estimates the confidence, the probability
+/// that the pose is right. Accept a pose with a confidence of 0.95 or more.
 #[derive(Debug, Parser)]
 #[command(name = "hybrid-icp", version, after_help = EXAMPLES, max_term_width = 110)]
 struct Cli {

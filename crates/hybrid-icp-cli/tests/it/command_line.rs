@@ -11,7 +11,7 @@ fn help_texts_have_80_columns_and_the_important_words() {
     for (command, words) in [
         (
             "--help",
-            &["Examples:", "Exit codes", "demo", "bop refine", "0.4"][..],
+            &["Examples:", "Exit codes", "demo", "bop refine", "0.95"][..],
         ),
         (
             "demo --help",
@@ -24,6 +24,7 @@ fn help_texts_have_80_columns_and_the_important_words() {
                 "cam_R_m2c",
                 "MM_PER_UNIT",
                 "kept_initial",
+                "expected_error_mm",
                 "OBJ, OFF, PLY or STL",
                 "m, mm or cm",
                 "cam_K",

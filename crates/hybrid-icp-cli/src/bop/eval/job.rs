@@ -36,7 +36,7 @@ pub(crate) struct EvalJob {
     /// every visible instance is a target.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) targets: Option<PathBuf>,
-    /// Ids of the objects whose AD is ADI; those with declared symmetries if not given.
+    /// Ids of the objects whose ADD(-S) is ADI; those with declared symmetries if not given.
     #[arg(long, value_name = "ID,…", value_delimiter = ',')]
     pub(crate) symmetric: Option<Vec<u32>>,
     /// Visibility tolerance of VSD in millimeters; the benchmark uses 5 for ITODD.

@@ -21,7 +21,7 @@ pub(crate) struct Summary {
     pub(crate) ar_vsd: f64,
     pub(crate) ar_mssd: f64,
     pub(crate) ar_mspd: f64,
-    /// Recall of ADD (ADI for symmetric objects) below a tenth of the diameter.
+    /// Recall of ADD(-S) below a tenth of the diameter.
     ad_recall: f64,
     /// Median ADI in millimeters of the estimates that match an instance; `null` without any.
     pub(crate) median_adi_mm: Option<f64>,

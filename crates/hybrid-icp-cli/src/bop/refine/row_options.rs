@@ -1,4 +1,4 @@
-//! The options that choose rows of a result file.
+//! The options that choose rows of a result file, or detections.
 
 use std::borrow::Borrow;
 use std::path::{Path, PathBuf};
@@ -10,24 +10,24 @@ use hicp_io::bop::ResultRow;
 use crate::bop::targets;
 use crate::terminal::warn;
 
-/// The options that choose the rows to refine and write; all by default.
+/// The options that choose the rows or detections to process; all by default.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct RowOptions {
-    /// Refine and write only part I of N, counted from 1. Images are never split. If the rows of
+    /// Process and write only part I of N, counted from 1. Images are never split. If the rows of
     /// each image are contiguous, the concatenated outputs of all parts, with one header line,
     /// equal the output of one run.
     #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
     shard: Option<Shard>,
-    /// Read only the first N rows of the result file. --top-k and --targets choose among these, and
-    /// --shard divides the rest.
+    /// Read only the first N rows or detections of the input. --top-k and --targets choose among
+    /// these, and --shard divides the rest.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     limit: Option<u32>,
-    /// Refine and write only the K rows with the best scores of every object in every image. Of
-    /// equal scores, the first rows are used.
+    /// Process and write only the K rows or detections with the best scores of every object in
+    /// every image. Of equal scores, the first ones are used.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     top_k: Option<u32>,
-    /// Refine and write only the rows of the targets in this file. Of each target, these are the
-    /// inst_count rows with the best scores, which an evaluation uses.
+    /// Process and write only the rows or detections of the targets in this file. Of each target,
+    /// these are the inst_count with the best scores, which an evaluation uses.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) targets: Option<PathBuf>,
 }
