@@ -354,6 +354,25 @@ fn results_with_bad_scores_cause_a_warning() {
     );
 }
 
+/// An ambiguous pose with a lower score is not described as if it were a worse one.
+#[test]
+fn the_warning_of_ambiguity_states_which_score_is_lower() {
+    let message = |gap| {
+        let rotation_degrees = 180.0;
+        let warning = Warning::Ambiguous {
+            gap,
+            rotation_degrees,
+        };
+        warning.to_string()
+    };
+    let usual = "ambiguous: 2 poses within 0.01, 180° apart";
+    assert_eq!(message(0.004), usual);
+    assert_eq!(
+        message(-0.004),
+        format!("{usual}, and the other has the lower score")
+    );
+}
+
 /// Objects without a flat side, found on a wall, cause a warning.
 ///
 /// An object with a flat side may fit a wall as well as its true place.
