@@ -2,16 +2,17 @@
 
 use hybrid_icp::pipeline::Catalog;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
+use pyo3::types::{PyDict, PyString};
 
 use crate::array;
 
 /// Writes a Python value as TOML: a bool, a number, a string, a dict or a sequence.
 pub(crate) fn value(value: &Bound<'_, PyAny>) -> PyResult<String> {
-    if value.cast::<PyBool>().is_ok() {
-        Ok(value.extract::<bool>()?.to_string())
-    } else if value.cast::<PyInt>().is_ok() || value.cast::<PyFloat>().is_ok() {
-        Ok(value.repr()?.to_string())
+    // Extraction also accepts `numpy.bool_`, and NumPy's numbers have these methods.
+    if let Ok(flag) = value.extract::<bool>() {
+        Ok(flag.to_string())
+    } else if let Ok(number) = value.call_method0("__index__") {
+        Ok(number.repr()?.to_string())
     } else if let Ok(text) = value.cast::<PyString>() {
         let text = text.to_string();
         Ok(format!("\"{}\"", text.escape_default()))
@@ -24,6 +25,8 @@ pub(crate) fn value(value: &Bound<'_, PyAny>) -> PyResult<String> {
     } else if let Ok(items) = value.try_iter() {
         let items: PyResult<Vec<String>> = items.map(|item| self::value(&item?)).collect();
         Ok(format!("[{}]", items?.join(", ")))
+    } else if let Ok(number) = value.call_method0("__float__") {
+        Ok(number.repr()?.to_string())
     } else {
         let expected = "a bool, a number, a string, a list or a dict";
         Err(array::unexpected("a field of a pipeline", value, expected))

@@ -115,6 +115,18 @@ def test_overrides_are_a_dict_or_assignments(scene):
         hi.Pipeline("hybrid", overrides={"times": "three"})
 
 
+def test_fields_accept_the_scalars_of_numpy():
+    for number in (np.float64(0.25), np.float32(0.25), np.array(0.25)):
+        assert hi.Pipeline(overrides={"threshold": number}).name == "auto threshold=0.25"
+    for times in (np.int64(3), np.uint8(3), np.array(3)):
+        assert hi.Pipeline("hybrid", overrides={"times": times}).name == "hybrid times=3"
+    with pytest.raises(hi.InputError, match="found true, expected"):
+        hi.Pipeline("hybrid", overrides={"times": np.True_})
+    gate = {"type": "max-distance", "limit": np.float64(0.1), "unit": "meters"}
+    parts = {"selection": "visible-surface", "association": "projective", "metric": "point-to-plane"}
+    assert "limit = 0.1," in hi.Pipeline.icp(**parts, filter=[gate]).toml
+
+
 def test_a_pipeline_of_parts_has_the_bits_of_its_file(scene):
     filters = [{"type": "max-distance", "limit": 0.25, "unit": "diameters"}]
     parts = {"selection": "visible-surface", "association": "projective", "metric": "point-to-plane"}
