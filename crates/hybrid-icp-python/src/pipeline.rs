@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::pipeline::PipelineFile;
-use hybrid_icp::{Preset, Refiner, Trace, Warning, warning_of_distance};
+use hybrid_icp::{Preset, Refiner, Trace, Warning, warnings_of_image};
 use pyo3::prelude::*;
 
 use crate::array::{self, Motion};
@@ -29,8 +29,9 @@ const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], mete
 /// name : str, optional
 ///     One of `Pipeline.presets()`. "local" refines the pose near its start. "search" and "auto"
 ///     also search for the object: "search" unless the refined pose explains the image well, "auto"
-///     only if it explains the image badly. "hybrid" is Hybrid ICP as in the paper, and
-///     "hybrid-visible" is a variant of it.
+///     only if it explains the image badly. "color" is "auto" with the colors of the model and the
+///     observation, which the others use only in `estimate`. "hybrid" is Hybrid ICP as in the
+///     paper, and "hybrid-visible" is a variant of it.
 /// overrides : dict, or sequence of str, optional
 ///     Fields to set, such as `{"threshold": 0.3}` of "auto" or `["times=3"]` of "hybrid".
 ///
@@ -56,6 +57,8 @@ pub(crate) struct PyPipeline {
     file: PipelineFile,
     toml: String,
     overrides: Vec<String>,
+    /// Whether a part compares colors.
+    colors: bool,
     /// Refiners that are not in use, with their scratch memory.
     refiners: Mutex<Vec<Refiner>>,
 }
@@ -249,8 +252,10 @@ impl PyPipeline {
     /// Warns
     /// -----
     /// InputWarning
-    ///     If the pose does not fit the image: the object is behind the camera, or at less than a
-    ///     third or more than three times the measured depth.
+    ///     If the inputs do not fit together: the object is behind the camera, or at less than a
+    ///     third or more than three times the measured depth; the mask is empty, without depth, or
+    ///     has far more or fewer pixels than the object; or colors that the pipeline compares are
+    ///     missing.
     ///
     /// Examples
     /// --------
@@ -279,7 +284,7 @@ impl PyPipeline {
     ) -> PyResult<Bound<'py, PyAny>> {
         let init = array::motion(T_co, "T_co")?;
         let (object, observation) = (model.get(), observation.get());
-        warn(py, object, observation, [&init].into_iter())?;
+        self.warn(py, object, observation, &[object.z_at(&init)], self.colors)?;
         let mut watch = Watch::new(observer)?;
         let mut refiner = self.take()?;
         let refinement = py.detach(|| {
@@ -314,6 +319,12 @@ impl PyPipeline {
     ///     Its `mve_initial` equals `mve`, because there is no initial pose. If no surface was
     ///     measured inside the mask, `outcome` is "kept_initial" and `T_co` is the identity.
     ///
+    /// Warns
+    /// -----
+    /// InputWarning
+    ///     As for `refine`, if the model does not fit the image at the measured depth. Any pipeline
+    ///     compares the colors of the observation.
+    ///
     /// Examples
     /// --------
     /// A plate is 0.5 m in front of the camera:
@@ -335,6 +346,10 @@ impl PyPipeline {
         observation: &Bound<'_, PyObservation>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (object, observation) = (model.get(), observation.get());
+        let colors = self.colors || observation.observation.color().is_some();
+        // Without depth, any distance in front of the camera will do.
+        let distance = observation.median_depth.unwrap_or(1.0);
+        self.warn(py, object, observation, &[distance], colors)?;
         let mut refiner = self.take()?;
         let (refinement, trace) = py.detach(|| {
             let mut trace = Trace::new();
@@ -373,6 +388,11 @@ impl PyPipeline {
     /// -------
     /// Result
     ///     Its `T_co` is the given pose, and `outcome` is "kept_initial".
+    ///
+    /// Warns
+    /// -----
+    /// InputWarning
+    ///     As for `refine`, except for colors.
     fn judge<'py>(
         &self,
         py: Python<'py>,
@@ -382,6 +402,7 @@ impl PyPipeline {
     ) -> PyResult<Bound<'py, PyAny>> {
         let pose = array::motion(T_co, "T_co")?;
         let (object, observation) = (model.get(), observation.get());
+        self.warn(py, object, observation, &[object.z_at(&pose)], false)?;
         let mut refiner = self.take()?;
         let judged =
             py.detach(|| refiner.judge(&object.model, &observation.observation, &pose.isometry));
@@ -428,7 +449,8 @@ impl PyPipeline {
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
         let (object, observation) = (model.get(), observation.get());
-        warn(py, object, observation, inits.iter())?;
+        let distances: Vec<f64> = inits.iter().map(|init| object.z_at(init)).collect();
+        self.warn(py, object, observation, &distances, self.colors)?;
         let poses: Vec<Isometry3<f64>> = inits.iter().map(|init| init.isometry).collect();
         let mut refiners = (0..threads.min(poses.len()))
             .map(|_| self.take())
@@ -505,6 +527,12 @@ impl PyPipeline {
             file.set(assignment).map_err(errors::input)?;
         }
         file.build().map_err(errors::input)?;
+        let of_colors = |text: &str| {
+            ["color-choice", "photometric"]
+                .iter()
+                .any(|p| text.contains(p))
+        };
+        let colors = of_colors(&toml) || overrides.iter().any(|text| of_colors(text));
         let words = std::iter::once(origin).chain(overrides.iter().map(String::as_str));
         Ok(Self {
             name: words.collect::<Vec<_>>().join(" "),
@@ -512,6 +540,7 @@ impl PyPipeline {
             file,
             toml,
             overrides,
+            colors,
             refiners: Mutex::default(),
         })
     }
@@ -532,39 +561,57 @@ impl PyPipeline {
     fn put_back(&self, refiners: impl IntoIterator<Item = Refiner>) {
         locked(&self.refiners).extend(refiners);
     }
+
+    /// Warns if missing colors are compared, and if the object fits the image at no distance.
+    fn warn(
+        &self,
+        py: Python<'_>,
+        object: &PyModel,
+        observation: &PyObservation,
+        distances: &[f64],
+        compares_colors: bool,
+    ) -> PyResult<()> {
+        let (model, image) = (&object.model, &observation.observation);
+        let missing = if model.mesh().color().is_none() {
+            Some("the model has no colors (Model.has_color)")
+        } else {
+            let colors = image.color().is_none();
+            colors.then_some("the observation has no color image (color=)")
+        };
+        if let Some(missing) = missing.filter(|_| compares_colors) {
+            let text = format!("{missing}, so that {} uses depth alone", self.__repr__());
+            errors::warn(py, &text)?;
+        }
+        if observation.pixels == 0 {
+            let text = "the mask is empty, expected pixels that are not 0 on the object";
+            errors::warn(py, text)?;
+        }
+        let (pixels, median) = (observation.pixels, observation.median_depth);
+        let at = |distance: &f64| warnings_of_image(model, image, *distance, pixels, median);
+        if distances.iter().any(|distance| at(distance).is_empty()) {
+            return Ok(());
+        }
+        let mut warnings = distances.first().into_iter().flat_map(at);
+        warnings.try_for_each(|warning| errors::warn(py, &in_words(warning)))
+    }
 }
 
-/// Warns if no pose fits the image.
-fn warn<'a>(
-    py: Python<'_>,
-    model: &PyModel,
-    observation: &PyObservation,
-    inits: impl Iterator<Item = &'a Motion>,
-) -> PyResult<()> {
-    let center = model.model.center();
-    let mut first = None;
-    for init in inits {
-        let distance = (init.isometry * center).z;
-        match warning_of_distance(distance, observation.median_depth) {
-            Some(warning) => first.get_or_insert(warning),
-            None => return Ok(()),
-        };
-    }
-    match first {
-        Some(Warning::BehindCamera { z }) => errors::warn(
-            py,
-            &format!(
-                "T_co puts the object's center at z = {z:.4} m, behind the camera, which looks \
-                 along +z: expected camera from object, not object from camera"
-            ),
+/// Returns a warning about inputs with the arguments to check.
+fn in_words(warning: Warning) -> String {
+    match warning {
+        Warning::BehindCamera { z } => format!(
+            "T_co puts the object's center at z = {z:.4} m, behind the camera, which looks along \
+             +z: expected camera from object, not object from camera"
         ),
-        Some(Warning::Depth { measured, expected }) => errors::warn(
-            py,
-            &format!(
-                "T_co puts the object's center at z = {expected:.4} m, but the median depth inside \
-                 the mask is {measured:.4} m: check the units of both, expected meters"
-            ),
+        Warning::Depth { measured, expected } => format!(
+            "T_co puts the object's center at z = {expected:.4} m, but the median depth inside the \
+             mask is {measured:.4} m: check the units of both, expected meters"
         ),
-        _ => Ok(()),
+        Warning::NoDepth => format!("{warning}: check scale= of the depth, and the mask"),
+        Warning::Mask { .. } | Warning::Sliver { .. } => format!(
+            "{warning}: check unit= of the model, that the pose is in meters, and that the mask \
+             shows the object"
+        ),
+        _ => warning.to_string(),
     }
 }

@@ -2,6 +2,7 @@
 
 import pickle
 import struct
+import warnings
 
 import numpy as np
 import pytest
@@ -175,3 +176,22 @@ def test_colors_tell_the_sides_of_a_square_apart_and_return_their_margin():
         result = pipeline.refine(model, observation, rough)
         assert np.array_equal(result.T_co, rough) and result.alternatives
         assert all(other["color_gap"] is None for other in result.alternatives)
+
+
+def test_colors_that_are_missing_cause_a_warning():
+    colored, plain = (hi.Model(CORNERS, FACES, colors=colors) for colors in (COLORS, None))
+    gray, painted = (hi.Observation(WALL, None, CAMERA, color=color) for color in (None, PICTURE))
+    pose = np.eye(4)
+    pose[2, 3] = 0.8
+    for pipeline in (hi.Pipeline("color"), hi.Pipeline.from_toml(hi.Pipeline("color").toml)):
+        with pytest.warns(hi.InputWarning, match=r"the model has no colors .* uses depth alone"):
+            pipeline.refine(plain, painted, pose)
+        with pytest.warns(hi.InputWarning, match=r"the observation has no color image .color=."):
+            pipeline.refine_batch(colored, gray, pose[None])
+    with pytest.warns(hi.InputWarning, match=r"no colors .* Pipeline\('local'\) uses depth alone"):
+        hi.Pipeline("local").estimate(plain, painted)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        hi.Pipeline("local").refine(plain, painted, pose)
+        hi.Pipeline("color").refine(colored, painted, pose)
+    assert not any("color" in str(warning.message) for warning in caught)

@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -97,6 +98,34 @@ def test_frames_and_units_that_do_not_match_cause_a_warning(scene):
     vertices, faces = bracket()
     with pytest.warns(hi.InputWarning, match='diameter is 1.*: check unit="m"'):
         hi.Model(vertices, faces)
+
+
+def test_masks_that_do_not_fit_the_object_cause_a_warning(scene):
+    def warns(message, model, observation):
+        pipeline = hi.Pipeline("local")
+        runs = [lambda: pipeline.refine(model, observation, scene.true)]
+        runs += [lambda: pipeline.refine_batch(model, observation, scene.true[None])]
+        runs += [lambda: pipeline.judge(model, observation, scene.true)]
+        for run in [*runs, lambda: pipeline.estimate(model, observation)]:
+            with pytest.warns(hi.InputWarning, match=message):
+                run()
+
+    vertices, faces = bracket()
+    small = hi.Model(vertices / 10, faces, unit="mm")
+    warns("the mask has .* covers at most .*: check unit= of the model", small, scene.observation)
+    large = hi.Model(vertices, faces, unit="cm")
+    warns("the mask has .* covers .*: check unit= of the model", large, scene.observation)
+    nothing = np.zeros_like(scene.mask)
+    empty = hi.Observation(scene.depth, nothing, scene.camera)
+    warns("the mask is empty, expected pixels", scene.model, empty)
+    unmeasured = hi.Observation(scene.depth * ~scene.mask, scene.mask, scene.camera)
+    warns("no depth inside the mask: check scale=", scene.model, unmeasured)
+    swapped = hi.Camera(300, 305, 121, 159.5, 320, 240)
+    swapped = hi.Observation(scene.depth, scene.mask, swapped)
+    warns("if cx and cy were swapped", scene.model, swapped)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        hi.Pipeline("local").estimate(scene.model, scene.observation)
 
 
 @pytest.mark.parametrize(

@@ -61,9 +61,6 @@ const DIAMETER_TOLERANCE: f64 = 0.05;
 /// ```
 #[must_use]
 pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Vec<Warning> {
-    let mut warnings = warnings_of_model(model);
-    warnings.extend(warning_of_center(observation.camera()));
-    let diameter = model.diameter();
     let rigid = se3::is_finite(init) && (init.rotation.norm() - 1.0).abs() < 1e-6;
     let distance = if rigid {
         (init * model.center()).z
@@ -71,22 +68,44 @@ pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>)
         f64::NAN
     };
     let (pixels, median) = inside_mask(observation);
-    match warning_of_distance(distance, median) {
-        Some(warning @ Warning::BehindCamera { .. }) => {
-            warnings.push(warning);
-            return warnings;
-        }
-        None if median.is_none() && pixels > 0 => warnings.push(Warning::NoDepth),
+    let mut warnings = warnings_of_model(model);
+    let mut of_image = warnings_of_image(model, observation, distance, pixels, median);
+    if !warnings.is_empty() {
+        // One warning about the same numbers is enough.
+        let size = |w: &Warning| matches!(w, Warning::Mask { .. } | Warning::Sliver { .. });
+        of_image.retain(|warning| !size(warning));
+    }
+    warnings.append(&mut of_image);
+    warnings
+}
+
+/// Returns the [`warnings`] that depend on an image, for callers that know more of it.
+///
+/// `distance` is z of the object's center in the camera frame, meters. `pixels` is the number of
+/// pixels of the mask, and `median_depth` their median depth in meters. Cost: O(1), and
+/// O(vertices) if the mask is small for the object.
+#[must_use]
+pub fn warnings_of_image(
+    model: &Model,
+    observation: &Observation,
+    distance: f64,
+    pixels: usize,
+    median_depth: Option<f64>,
+) -> Vec<Warning> {
+    let camera = observation.camera();
+    let mut warnings = Vec::from_iter(warning_of_center(camera));
+    match warning_of_distance(distance, median_depth) {
+        None if median_depth.is_none() && pixels > 0 => warnings.push(Warning::NoDepth),
         warning => warnings.extend(warning),
     }
-    // No silhouette of that diameter is larger than a disc.
-    let camera = observation.camera();
-    let at_most =
-        FRAC_PI_4 * (camera.fx() * diameter / distance) * (camera.fy() * diameter / distance);
-    // One warning about the same numbers is enough.
     if !warnings.is_empty() || pixels == 0 {
         return warnings;
     }
+    let diameter = model.diameter();
+    // The pixels of a square meter at the distance.
+    let density = camera.fx() * camera.fy() / distance.powi(2);
+    // No silhouette of that diameter is larger than a disc.
+    let at_most = FRAC_PI_4 * density * diameter.powi(2);
     if pixels as f64 > MASK_RATIO * at_most.max(1.0) {
         warnings.push(Warning::Mask {
             pixels,
@@ -95,14 +114,18 @@ pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>)
             distance,
         });
     }
-    let at_least = camera.fx() * camera.fy() * smallest_side(model) / distance.powi(2);
-    if at_least > SLIVER_RATIO * pixels as f64 && !touches_border(observation) {
-        warnings.push(Warning::Sliver {
-            pixels,
-            at_least,
-            diameter,
-            distance,
-        });
+    let too_many = SLIVER_RATIO * pixels as f64;
+    let widest = 2.0 * model.radius();
+    if density * widest.powi(2) > too_many && !touches_border(observation) {
+        let at_least = density * smallest_side(model);
+        if at_least > too_many {
+            warnings.push(Warning::Sliver {
+                pixels,
+                at_least,
+                diameter,
+                distance,
+            });
+        }
     }
     warnings
 }

@@ -436,7 +436,8 @@ class Observation:
         Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
     color : numpy.ndarray of uint8, shape (H, W, 3), optional
         Red, green and blue of the same pixels. It decides where depth alone is ambiguous, with a
-        model that has colors (`Model.has_color`).
+        model that has colors (`Model.has_color`). Only `Pipeline("color")`, custom pipelines with
+        parts that compare colors, and `estimate` use it.
     normal_window : int, optional
         Half side of the window that normals are fitted over, from 1 (3 × 3 pixels) to 10. By
         default, it follows the noise of the image.
@@ -562,8 +563,9 @@ class Pipeline:
     name : str, optional
         One of `Pipeline.presets()`. "local" refines the pose near its start. "search" and "auto"
         also search for the object: "search" unless the refined pose explains the image well, "auto"
-        only if it explains the image badly. "hybrid" is Hybrid ICP as in the paper, and
-        "hybrid-visible" is a variant of it.
+        only if it explains the image badly. "color" is "auto" with the colors of the model and the
+        observation, which the others use only in `estimate`. "hybrid" is Hybrid ICP as in the
+        paper, and "hybrid-visible" is a variant of it.
     overrides : dict, or sequence of str, optional
         Fields to set, such as `{"threshold": 0.3}` of "auto" or `["times=3"]` of "hybrid".
 
@@ -716,8 +718,10 @@ class Pipeline:
         Warns
         -----
         InputWarning
-            If the pose does not fit the image: the object is behind the camera, or at less than a
-            third or more than three times the measured depth.
+            If the inputs do not fit together: the object is behind the camera, or at less than a
+            third or more than three times the measured depth; the mask is empty, without depth, or
+            has far more or fewer pixels than the object; or colors that the pipeline compares are
+            missing.
 
         Examples
         --------
@@ -756,6 +760,12 @@ class Pipeline:
             Its `mve_initial` equals `mve`, because there is no initial pose. If no surface was
             measured inside the mask, `outcome` is "kept_initial" and `T_co` is the identity.
 
+        Warns
+        -----
+        InputWarning
+            As for `refine`, if the model does not fit the image at the measured depth. Any pipeline
+            compares the colors of the observation.
+
         Examples
         --------
         A plate is 0.5 m in front of the camera:
@@ -791,6 +801,11 @@ class Pipeline:
         -------
         Result
             Its `T_co` is the given pose, and `outcome` is "kept_initial".
+
+        Warns
+        -----
+        InputWarning
+            As for `refine`, except for colors.
         """
 
     def refine_batch(self, model: Model, observation: Observation, T_co: npt.ArrayLike, threads: int | None=None) -> list[Result]:

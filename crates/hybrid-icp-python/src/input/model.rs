@@ -17,7 +17,7 @@ use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::array::{self, Matrix};
+use crate::array::{self, Matrix, Motion};
 use crate::errors::{self, InputError};
 use crate::input::color;
 
@@ -329,6 +329,11 @@ impl PyModel {
             model,
             points: OnceLock::new(),
         }
+    }
+
+    /// Returns z of the object's center in the camera frame, meters.
+    pub(crate) fn z_at(&self, pose: &Motion) -> f64 {
+        (pose.isometry * self.model.center()).z
     }
 
     /// Returns the points for pose errors, computed on the first call.

@@ -36,7 +36,8 @@ type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict
 ///     Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
 /// color : numpy.ndarray of uint8, shape (H, W, 3), optional
 ///     Red, green and blue of the same pixels. It decides where depth alone is ambiguous, with a
-///     model that has colors (`Model.has_color`).
+///     model that has colors (`Model.has_color`). Only `Pipeline("color")`, custom pipelines with
+///     parts that compare colors, and `estimate` use it.
 /// normal_window : int, optional
 ///     Half side of the window that normals are fitted over, from 1 (3 × 3 pixels) to 10. By
 ///     default, it follows the noise of the image.
@@ -63,6 +64,8 @@ type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict
 #[derive(Debug)]
 pub(crate) struct PyObservation {
     pub(crate) observation: Observation,
+    /// Number of pixels of the mask.
+    pub(crate) pixels: usize,
     /// Median depth inside the mask, meters; `None` if no masked pixel was measured.
     pub(crate) median_depth: Option<f64>,
 }
@@ -275,7 +278,9 @@ impl PyObservation {
         let median_depth = masked_median(&observation, down, right)
             .or_else(|| masked_median(&observation, 1, 1))
             .map(f64::from);
+        let mask = observation.mask().pixels();
         Ok(Self {
+            pixels: mask.iter().filter(|set| **set).count(),
             observation,
             median_depth,
         })
