@@ -284,7 +284,7 @@ impl PyPipeline {
     ) -> PyResult<Bound<'py, PyAny>> {
         let init = array::motion(T_co, "T_co")?;
         let (object, observation) = (model.get(), observation.get());
-        self.warn(py, object, observation, &[object.z_at(&init)], self.colors)?;
+        self.warn_of(py, object, observation, &init)?;
         let mut watch = Watch::new(observer)?;
         let mut refiner = self.take()?;
         let refinement = py.detach(|| {
@@ -562,6 +562,17 @@ impl PyPipeline {
         locked(&self.refiners).extend(refiners);
     }
 
+    /// Warns as `refine` does for one pose.
+    pub(crate) fn warn_of(
+        &self,
+        py: Python<'_>,
+        model: &PyModel,
+        observation: &PyObservation,
+        init: &Motion,
+    ) -> PyResult<()> {
+        self.warn(py, model, observation, &[model.z_at(init)], self.colors)
+    }
+
     /// Warns if missing colors are compared, and if the object fits the image at no distance.
     fn warn(
         &self,
@@ -597,7 +608,7 @@ impl PyPipeline {
 }
 
 /// Returns a warning about inputs with the arguments to check.
-fn in_words(warning: Warning) -> String {
+pub(crate) fn in_words(warning: Warning) -> String {
     match warning {
         Warning::BehindCamera { z } => format!(
             "T_co puts the object's center at z = {z:.4} m, behind the camera, which looks along \

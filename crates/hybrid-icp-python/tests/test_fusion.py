@@ -61,3 +61,15 @@ def test_the_sequential_estimator_follows_a_moving_camera(scene, paper):
     assert estimator.step(nothing).event == ("accepted" if paper else "no_estimate")
     estimator.restart(scene.rough)
     assert estimator.estimate is None
+
+
+def test_the_sequential_estimator_warns_of_the_first_pose_and_states_its_place(scene):
+    inverted = np.linalg.inv(scene.true)
+    estimator = hi.SequentialEstimator(hi.Pipeline("local"), "average", scene.model, inverted)
+    with pytest.warns(hi.InputWarning, match="behind the camera, .* not object from camera"):
+        estimator.step(scene.observation)
+    estimator.restart(scene.true)
+    text = "SequentialEstimator('average', no estimate, t = (0.0200, -0.0100, 0.4200) m)"
+    assert repr(estimator) == text
+    estimator.step(scene.observation)
+    assert repr(estimator).startswith("SequentialEstimator('average', estimated, t = (0.0")

@@ -30,3 +30,19 @@ def test_images_of_another_size_are_refused(scene):
     tracker = hi.Tracker(scene.model, scene.camera, scene.true)
     with pytest.raises(hi.InputError, match="4x3"):
         tracker.step(np.full((3, 4), 0.5, np.float32), 1 / 30)
+
+
+def test_implausible_arguments_are_refused_or_cause_a_warning(scene):
+    with pytest.raises(hi.InputError, match="meters_per_second is -1, expected a finite speed"):
+        hi.Tracker(scene.model, scene.camera, scene.true, meters_per_second=-1)
+    with pytest.raises(hi.InputError, match="degrees_per_second is NaN, expected a finite speed"):
+        hi.Tracker(scene.model, scene.camera, scene.true, degrees_per_second=np.nan)
+    with pytest.warns(hi.InputWarning, match="behind the camera, .* not object from camera"):
+        hi.Tracker(scene.model, scene.camera, np.linalg.inv(scene.true))
+    tracker = hi.Tracker(scene.model, scene.camera, scene.true)
+    for seconds in (-1 / 30, np.nan, np.inf, 33.0):
+        with pytest.raises(hi.InputError, match=r"seconds is .*, expected the seconds since"):
+            tracker.step(scene.depth, seconds)
+    assert repr(tracker) == "Tracker(started, t = (0.0200, -0.0100, 0.4200) m)"
+    tracker.step(scene.depth, 0)
+    assert repr(tracker).startswith("Tracker(tracking, t = (0.0")

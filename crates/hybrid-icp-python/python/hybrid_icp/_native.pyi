@@ -1033,6 +1033,11 @@ class SequentialEstimator:
         Returns
         -------
         SequentialStep
+
+        Warns
+        -----
+        InputWarning
+            As for `Pipeline.refine`, while there is no estimate.
         """
 
     def move_camera(self, T_nc: npt.ArrayLike, covariance: npt.ArrayLike | None=None) -> None:
@@ -1085,6 +1090,11 @@ class Tracker:
     degrees_per_second : float, optional
         Typical angular speed, degrees per second.
 
+    Warns
+    -----
+    InputWarning
+        If the rough pose puts the object behind the camera.
+
     Examples
     --------
     >>> import numpy as np
@@ -1115,7 +1125,7 @@ class Tracker:
         depth : DepthImage or numpy.ndarray, shape (H, W)
             In meters, as for `Observation`, in the size of the camera.
         seconds : float
-            Time since the previous image.
+            Time since the previous image, at most 10. Restart the tracker after a longer pause.
         mask : numpy.ndarray, shape (H, W), optional
             Pixels to which the object is restricted. Not needed.
         scale : float, optional
@@ -1128,7 +1138,7 @@ class Tracker:
         Raises
         ------
         InputError
-            If the sizes of the image, the mask and the camera differ.
+            If the sizes of the image, the mask and the camera differ, or `seconds` is no such time.
         """
 
     def restart(self, T_co: npt.ArrayLike) -> None:

@@ -6,7 +6,7 @@ use hybrid_icp::SequentialEstimator;
 use hybrid_icp::fusion::FusionMethod;
 use pyo3::prelude::*;
 
-use crate::array::{self, Matrix};
+use crate::array::{self, Matrix, Motion};
 use crate::errors;
 use crate::input::model::PyModel;
 use crate::input::observation::PyObservation;
@@ -36,6 +36,8 @@ use crate::sequence::fusion::{self, PyPoseEstimate};
 #[pyclass(frozen, module = "hybrid_icp", name = "SequentialEstimator")]
 pub(crate) struct PySequentialEstimator {
     estimator: Mutex<SequentialEstimator>,
+    pipeline: Py<PyPipeline>,
+    method: FusionMethod,
     model: Py<PyModel>,
 }
 
@@ -61,6 +63,8 @@ impl PySequentialEstimator {
         };
         Ok(Self {
             estimator: Mutex::new(estimator.map_err(errors::input)?),
+            pipeline: pipeline.clone().unbind(),
+            method,
             model: model.clone().unbind(),
         })
     }
@@ -79,6 +83,11 @@ impl PySequentialEstimator {
     /// Returns
     /// -------
     /// SequentialStep
+    ///
+    /// Warns
+    /// -----
+    /// InputWarning
+    ///     As for `Pipeline.refine`, while there is no estimate.
     #[pyo3(signature = (observation, T_nc = None, covariance = None))]
     fn step<'py>(
         &self,
@@ -88,7 +97,18 @@ impl PySequentialEstimator {
         covariance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let motion = fusion::motion(T_nc, covariance)?;
-        let (model, observation) = (&self.model.get().model, &observation.get().observation);
+        let (model, observation) = (self.model.get(), observation.get());
+        let first = py.detach(|| {
+            let estimator = locked(&self.estimator);
+            let init = estimator.camera_from_object();
+            estimator.estimate().is_none().then_some(init)
+        });
+        if let Some(init) = first {
+            let init = Motion::new(motion.apply(&init));
+            let pipeline = self.pipeline.get();
+            pipeline.warn_of(py, model, observation, &init)?;
+        }
+        let (model, observation) = (&model.model, &observation.observation);
         // Release the GIL first: another thread may hold the lock for a whole step.
         let step = py.detach(|| locked(&self.estimator).step(model, observation, &motion));
         results::sequential_step(py, &step)
@@ -138,5 +158,14 @@ impl PySequentialEstimator {
     fn estimate(&self, py: Python<'_>) -> Option<PyPoseEstimate> {
         py.detach(|| locked(&self.estimator).estimate())
             .map(PyPoseEstimate)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let (method, place) = (self.method, self.T_co(py).translation());
+        let state = match self.estimate(py) {
+            Some(_) => "estimated",
+            None => "no estimate",
+        };
+        format!("SequentialEstimator('{method}', {state}, t = {place} m)")
     }
 }

@@ -2,15 +2,21 @@
 
 use std::sync::Mutex;
 
-use hybrid_icp::{Tracker, TrackerConfig};
+use hybrid_icp::core::{ImageError, Isometry3};
+use hybrid_icp::{Tracker, TrackerConfig, warning_of_distance};
 use pyo3::prelude::*;
 
-use crate::array;
+use crate::array::{self, Matrix};
+use crate::errors::InputError;
 use crate::input::camera::PyCamera;
 use crate::input::depth;
 use crate::input::model::PyModel;
 use crate::mutex::locked;
+use crate::pipeline::in_words;
 use crate::{errors, results};
+
+/// The longest time between two images, seconds. Longer ones are probably in other units.
+const MAX_SECONDS: f64 = 10.0;
 
 /// Tracks a moving object from depth image to depth image, without masks.
 ///
@@ -30,6 +36,11 @@ use crate::{errors, results};
 /// degrees_per_second : float, optional
 ///     Typical angular speed, degrees per second.
 ///
+/// Warns
+/// -----
+/// InputWarning
+///     If the rough pose puts the object behind the camera.
+///
 /// Examples
 /// --------
 /// >>> import numpy as np
@@ -48,7 +59,17 @@ use crate::{errors, results};
 /// >>> bool(np.allclose(tracked.T_co, pose, atol=0.005))
 /// True
 #[pyclass(frozen, module = "hybrid_icp", name = "Tracker")]
-pub(crate) struct PyTracker(Mutex<Tracker>);
+pub(crate) struct PyTracker {
+    tracking: Mutex<Tracking>,
+    model: Py<PyModel>,
+}
+
+/// A tracker with the last state and pose.
+struct Tracking {
+    tracker: Tracker,
+    state: &'static str,
+    camera_from_object: Isometry3<f64>,
+}
 
 #[pymethods]
 #[allow(non_snake_case)]
@@ -62,15 +83,31 @@ impl PyTracker {
         meters_per_second: f64,
         degrees_per_second: f64,
     ) -> PyResult<Self> {
+        for (name, speed) in [
+            ("meters_per_second", meters_per_second),
+            ("degrees_per_second", degrees_per_second),
+        ] {
+            if !(speed.is_finite() && speed >= 0.0) {
+                let text = format!("{name} is {speed}, expected a finite speed, 0 or more");
+                return Err(InputError::new_err(text));
+            }
+        }
         let config = TrackerConfig {
             meters_per_second,
             degrees_per_second,
             ..TrackerConfig::default()
         };
-        let model = model.get().model.clone();
-        let mut tracker = Tracker::new(model, camera.get().0, config);
-        tracker.start(&array::motion(T_co, "T_co")?.isometry);
-        Ok(Self(Mutex::new(tracker)))
+        let tracker = Tracker::new(model.get().model.clone(), camera.get().0, config);
+        let this = Self {
+            tracking: Mutex::new(Tracking {
+                tracker,
+                state: "started",
+                camera_from_object: Isometry3::identity(),
+            }),
+            model: model.clone().unbind(),
+        };
+        this.restart(model.py(), T_co)?;
+        Ok(this)
     }
 
     /// Tracks the object in the next image.
@@ -80,7 +117,7 @@ impl PyTracker {
     /// depth : DepthImage or numpy.ndarray, shape (H, W)
     ///     In meters, as for `Observation`, in the size of the camera.
     /// seconds : float
-    ///     Time since the previous image.
+    ///     Time since the previous image, at most 10. Restart the tracker after a longer pause.
     /// mask : numpy.ndarray, shape (H, W), optional
     ///     Pixels to which the object is restricted. Not needed.
     /// scale : float, optional
@@ -93,7 +130,7 @@ impl PyTracker {
     /// Raises
     /// ------
     /// InputError
-    ///     If the sizes of the image, the mask and the camera differ.
+    ///     If the sizes of the image, the mask and the camera differ, or `seconds` is no such time.
     #[pyo3(signature = (depth, seconds, mask = None, *, scale = None))]
     fn step<'py>(
         &self,
@@ -103,13 +140,28 @@ impl PyTracker {
         mask: Option<&Bound<'_, PyAny>>,
         scale: Option<f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        if !(0.0..=MAX_SECONDS).contains(&seconds) {
+            return Err(InputError::new_err(format!(
+                "seconds is {seconds}, expected the seconds since the previous image, 0 to \
+                 {MAX_SECONDS}"
+            )));
+        }
         let depth = depth::shared(depth, scale)?;
         let mask = mask
             .map(|mask| depth::mask(Some(mask), &depth))
             .transpose()?;
         // Release the GIL first: another thread may hold the lock for a whole step.
-        let tracked = py.detach(|| locked(&self.0).step(&depth, seconds, mask.as_ref()));
-        results::tracked(py, &tracked.map_err(errors::input)?)
+        let tracked = py.detach(|| {
+            let mut tracking = locked(&self.tracking);
+            let tracked = tracking.tracker.step(&depth, seconds, mask.as_ref())?;
+            tracking.state = tracked.state.name();
+            tracking.camera_from_object = tracked.camera_from_object;
+            Ok(tracked)
+        });
+        results::tracked(
+            py,
+            &tracked.map_err(|error: ImageError| errors::input(error))?,
+        )
     }
 
     /// Starts again from a rough pose in the next image.
@@ -119,8 +171,24 @@ impl PyTracker {
     /// T_co : array_like, shape (4, 4)
     ///     Camera from object, meters.
     fn restart(&self, py: Python<'_>, T_co: &Bound<'_, PyAny>) -> PyResult<()> {
-        let init = array::motion(T_co, "T_co")?.isometry;
-        py.detach(|| locked(&self.0).start(&init));
+        let init = array::motion(T_co, "T_co")?;
+        if let Some(warning) = warning_of_distance(self.model.get().z_at(&init), None) {
+            errors::warn(py, &in_words(warning))?;
+        }
+        py.detach(|| {
+            let mut tracking = locked(&self.tracking);
+            tracking.tracker.start(&init.isometry);
+            tracking.state = "started";
+            tracking.camera_from_object = init.isometry;
+        });
         Ok(())
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        py.detach(|| {
+            let tracking = locked(&self.tracking);
+            let place = Matrix::from(&tracking.camera_from_object).translation();
+            format!("Tracker({}, t = {place} m)", tracking.state)
+        })
     }
 }
