@@ -211,7 +211,7 @@ impl PyPipeline {
 
     /// Name in reports: the name of the preset or file, followed by the overrides.
     #[getter]
-    fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 

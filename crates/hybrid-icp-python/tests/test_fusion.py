@@ -73,3 +73,21 @@ def test_the_sequential_estimator_warns_of_the_first_pose_and_states_its_place(s
     assert repr(estimator) == text
     estimator.step(scene.observation)
     assert repr(estimator).startswith("SequentialEstimator('average', estimated, t = (0.0")
+
+
+def test_a_calibrated_covariance_is_at_least_the_error_of_models(scene):
+    def deviation(**options):
+        arguments = hi.Pipeline("hybrid"), "weighted-average", scene.model, scene.rough
+        step = hi.SequentialEstimator(*arguments, **options).step(scene.observation)
+        x, y, z = step.T_co[:3, :3] @ scene.model.center + step.T_co[:3, 3]
+        of_center = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
+        variance = np.trace(of_center @ step.covariance @ of_center.T) / 3
+        return np.sqrt(variance) / scene.model.radius
+
+    assert 0.02 < deviation(covariance="calibrated") < 0.03 < deviation()
+    for options, message in [
+        ({"covariance": "exact"}, 'covariance is "exact", expected "mve" or "calibrated"'),
+        ({"covariance": "calibrated", "paper": True}, "paper is True with covariance="),
+    ]:
+        with pytest.raises(hi.InputError, match=message):
+            deviation(**options)

@@ -414,7 +414,8 @@ class SequentialStep:
     T_co : numpy.ndarray, shape (4, 4), float64
         The fused pose, meters. While there is no estimate, the initial pose moved with the camera.
     covariance : numpy.ndarray, shape (6, 6), float64, or None
-        Its covariance of ξ = [ρ; φ]; None while there is no estimate.
+        Its covariance of ξ = [ρ; φ]; None while there is no estimate. It is calibrated only with
+        `SequentialEstimator(covariance="calibrated")`.
     T_init : numpy.ndarray, shape (4, 4), float64
         The pose that ICP started from, meters: the last fused pose, moved with the camera.
     T_registered : numpy.ndarray, shape (4, 4), float64

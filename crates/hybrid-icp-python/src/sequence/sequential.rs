@@ -2,12 +2,12 @@
 
 use std::sync::Mutex;
 
-use hybrid_icp::SequentialEstimator;
 use hybrid_icp::fusion::FusionMethod;
+use hybrid_icp::{Calibration, SequentialEstimator};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, Motion};
-use crate::errors;
+use crate::errors::{self, InputError};
 use crate::input::model::PyModel;
 use crate::input::observation::PyObservation;
 use crate::mutex::locked;
@@ -33,6 +33,12 @@ use crate::sequence::fusion::{self, PyPoseEstimate};
 ///     If true, follows §V exactly: no gate, and covariances e_MVE·I₆ that do not move with the
 ///     camera. Otherwise uncertainty refers to the center of the object, estimates with an MVE
 ///     above 0.4 are rejected, and symmetric poses are fused as one.
+/// covariance : {"mve", "calibrated"}, optional
+///     Covariance of the estimates. "mve" is a weight: the MVE in units of the object. It compares
+///     images and is not calibrated, so do not use it as an error. "calibrated" is about as wide as
+///     the errors: the covariance of the registration, with factors that were fitted to "hybrid"
+///     and to models reconstructed from images. It also rejects estimates with an MVE above 0.25,
+///     and those that are far from the fused pose. It excludes `paper`.
 #[pyclass(frozen, module = "hybrid_icp", name = "SequentialEstimator")]
 pub(crate) struct PySequentialEstimator {
     estimator: Mutex<SequentialEstimator>,
@@ -45,21 +51,33 @@ pub(crate) struct PySequentialEstimator {
 #[allow(non_snake_case)]
 impl PySequentialEstimator {
     #[new]
-    #[pyo3(signature = (pipeline, method, model, T_co, *, paper = false))]
+    #[pyo3(signature = (pipeline, method, model, T_co, *, paper = false, covariance = "mve"))]
     fn new(
         pipeline: &Bound<'_, PyPipeline>,
         method: &str,
         model: &Bound<'_, PyModel>,
         T_co: &Bound<'_, PyAny>,
         paper: bool,
+        covariance: &str,
     ) -> PyResult<Self> {
         let method: FusionMethod = method.parse().map_err(errors::input)?;
         let init = array::motion(T_co, "T_co")?.isometry;
+        let choices = [("mve", false), ("calibrated", true)];
+        let calibrated = array::choice("covariance", covariance, choices)?;
         let stage = pipeline.get().build()?;
-        let estimator = if paper {
-            SequentialEstimator::paper(stage, method, &init)
-        } else {
-            SequentialEstimator::for_object(stage, method, &model.get().model, &init)
+        let object = &model.get().model;
+        let estimator = match (paper, calibrated) {
+            (false, false) => SequentialEstimator::for_object(stage, method, object, &init),
+            (false, true) => {
+                let preset = pipeline.get().name().parse();
+                let calibration = preset.map_or(Calibration::HYBRID, Calibration::of);
+                SequentialEstimator::calibrated(stage, method, &calibration, object, &init)
+            }
+            (true, false) => SequentialEstimator::paper(stage, method, &init),
+            (true, true) => {
+                let text = "paper is True with covariance=\"calibrated\", expected one of them";
+                return Err(InputError::new_err(text));
+            }
         };
         Ok(Self {
             estimator: Mutex::new(estimator.map_err(errors::input)?),
