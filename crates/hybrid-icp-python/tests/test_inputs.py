@@ -271,6 +271,23 @@ def test_an_image_from_a_file_equals_the_array_from_it(tmp_path):
         hi.DepthImage.from_png(tmp_path / "none.png", 0.0001)
 
 
+def test_a_scale_in_millimeters_is_found_and_corrected(tmp_path):
+    path = tmp_path / "depth.png"
+    units = np.full((48, 64), 8000, np.uint16)
+    write_png(path, units)
+    readers = [lambda: hi.DepthImage.from_png(path, 0.1), lambda: hi.read_depth_png(path, 0.1)]
+    readers += [lambda: hi.read_depth(path, scale=0.1), lambda: hi.DepthImage(units, scale=0.1)]
+    for read in readers:
+        with pytest.raises(hi.InputError, match="median 800, .* pass scale=0.0001"):
+            read()
+    with pytest.raises(hi.FileError, match="found integers, .* scale= .meters per unit."):
+        hi.read_depth(path)
+    with pytest.raises(hi.InputError, match="scale is -1, expected meters per unit above 0"):
+        hi.read_depth(path, scale=-1)
+    with pytest.raises(hi.InputError, match="median 800, .*divide the points by 1000"):
+        hi.DepthImage.from_points([[0, 0, 800]], CAMERA)
+
+
 def test_files_of_numpy_are_read(tmp_path):
     meters = np.linspace(0.5, 1.5, 48 * 64, dtype=np.float32).reshape(48, 64)
     np.save(tmp_path / "depth.npy", meters)

@@ -213,6 +213,8 @@ class DepthImage:
         ------
         FileError
             If the file cannot be read or is not such an image.
+        InputError
+            If `scale` is wrong, or the depths in it cannot be meters.
         """
 
     @staticmethod
@@ -1466,6 +1468,8 @@ def read_depth(path: _Path, *, scale: float | None=None) -> npt.NDArray[np.float
     ------
     FileError
         If the file cannot be read, is not such an image, or has integers and `scale` is missing.
+    InputError
+        If `scale` is wrong, or the depths in it cannot be meters.
     """
 
 def read_depth_png(path: _Path, scale: float) -> npt.NDArray[np.float32]:

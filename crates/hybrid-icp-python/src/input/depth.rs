@@ -22,6 +22,9 @@ const MAX_MEDIAN_METERS: f32 = 100.0;
 /// The smallest median depth accepted, meters. Smaller values were probably scaled twice.
 const MIN_MEDIAN_METERS: f32 = 0.01;
 
+/// The advice for arrays of millimeters.
+const ADVICE: &str = "divide by 1000, or pass uint16 with scale=0.001";
+
 /// Rows and columns of the pixel grid that the check of the unit reads first.
 const GRID: usize = 64;
 
@@ -83,11 +86,15 @@ impl PyDepthImage {
     /// ------
     /// FileError
     ///     If the file cannot be read or is not such an image.
+    /// InputError
+    ///     If `scale` is wrong, or the depths in it cannot be meters.
     #[staticmethod]
     pub(crate) fn from_png(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<Self> {
-        py.detach(|| hicp_io::read_depth_png(&path, scale * 1000.0))
-            .map(|image| Self(Arc::new(image)))
-            .map_err(errors::file)
+        let millimeters = millimeters(scale)?;
+        let image = py.detach(|| hicp_io::read_depth_png(&path, millimeters));
+        let image = image.map_err(errors::file)?;
+        check(&image, &advice_on(scale))?;
+        Ok(Self(Arc::new(image)))
     }
 
     /// Projects the points of a depth sensor into a camera; the nearest point of a pixel counts.
@@ -118,6 +125,7 @@ impl PyDepthImage {
         let pose = T_cp.map(|pose| array::motion(pose, "T_cp")).transpose()?;
         let pose = pose.map_or_else(Isometry3::identity, |pose| pose.isometry);
         let image = DepthImage::from_points(points, &camera.0, &pose);
+        check(&image, "divide the points by 1000")?;
         Ok(Self(Arc::new(image)))
     }
 
@@ -176,10 +184,10 @@ fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
     let value = &array::aligned(value)?;
     if let Ok(meters) = value.extract::<PyReadonlyArray2<'_, f32>>() {
         no_scale(scale, value)?;
-        convert(&meters.as_array(), |z| z)
+        convert(&meters.as_array(), |z| z, ADVICE)
     } else if let Ok(meters) = value.extract::<PyReadonlyArray2<'_, f64>>() {
         no_scale(scale, value)?;
-        convert(&meters.as_array(), narrow)
+        convert(&meters.as_array(), narrow, ADVICE)
     } else if let Ok(units) = value.extract::<PyReadonlyArray2<'_, u16>>() {
         let scale = scale.ok_or_else(|| {
             InputError::new_err(format!(
@@ -188,14 +196,10 @@ fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
                 array::describe(value)
             ))
         })?;
-        if !(scale.is_finite() && scale > 0.0) {
-            return Err(InputError::new_err(format!(
-                "scale is {scale}, expected meters per unit above 0, such as 0.001 for millimeters"
-            )));
-        }
         // The same rounding as for depth PNGs: units times millimeters per unit, then to meters.
-        let scale = scale * 1000.0;
-        convert(&units.as_array(), |z| narrow(f64::from(z) * scale / 1000.0))
+        let millimeters = millimeters(scale)?;
+        let meters = |z| narrow(f64::from(z) * millimeters / 1000.0);
+        convert(&units.as_array(), meters, &advice_on(scale))
     } else {
         Err(unexpected("depth", value, EXPECTED_DEPTH))
     }
@@ -205,9 +209,10 @@ fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
 fn convert<T: Copy>(
     array: &ArrayView2<'_, T>,
     meters: impl Fn(T) -> f32 + Copy,
+    advice: &str,
 ) -> PyResult<DepthImage> {
     let (width, height) = size(array)?;
-    check_unit(array, meters)?;
+    check_unit(array, meters, advice)?;
     match array.as_slice() {
         Some(row_major) => DepthImage::collect(width, height, row_major.iter().map(|z| meters(*z))),
         None => DepthImage::collect(width, height, array.iter().map(|z| meters(*z))),
@@ -299,12 +304,39 @@ fn size<T>(array: &ArrayView2<'_, T>) -> PyResult<(u32, u32)> {
     Ok((side(array.ncols())?, side(array.nrows())?))
 }
 
-/// Returns an error if the depths cannot be in meters.
+/// Returns the millimeters per unit of a `scale`, which is in meters per unit.
+pub(crate) fn millimeters(scale: f64) -> PyResult<f64> {
+    if scale.is_finite() && scale > 0.0 {
+        return Ok(scale * 1000.0);
+    }
+    Err(InputError::new_err(format!(
+        "scale is {scale}, expected meters per unit above 0, such as 0.001 for millimeters"
+    )))
+}
+
+/// Returns the advice for depths that are too large at a scale.
+pub(crate) fn advice_on(scale: f64) -> String {
+    format!(
+        "scale={scale} is in meters per unit; for {scale} mm per unit, as depth_scale of BOP, pass \
+         scale={}",
+        scale / 1000.0
+    )
+}
+
+/// Returns an error if the depths of an image cannot be in meters.
+pub(crate) fn check(image: &DepthImage, advice: &str) -> PyResult<()> {
+    let shape = (image.height() as usize, image.width() as usize);
+    let array = ArrayView2::from_shape(shape, image.pixels()).map_err(errors::input)?;
+    check_unit(&array, |z| z, advice)
+}
+
+/// Returns an error if the depths cannot be in meters. `advice` corrects depths that are too large.
 ///
 /// Reads the pixels of a grid. If none of them was measured, reads all pixels.
 fn check_unit<T: Copy>(
     array: &ArrayView2<'_, T>,
     meters: impl Fn(T) -> f32 + Copy,
+    advice: &str,
 ) -> PyResult<()> {
     let (down, right) = strides(array.nrows(), array.ncols());
     let rows = (down / 2..array.nrows()).step_by(down);
@@ -317,8 +349,7 @@ fn check_unit<T: Copy>(
     };
     if middle > MAX_MEDIAN_METERS {
         return Err(InputError::new_err(format!(
-            "depth looks like millimeters: median {middle:.0}, expected meters (divide by 1000, or \
-             pass uint16 with scale=0.001)"
+            "depth looks like millimeters: median {middle:.0}, expected meters ({advice})"
         )));
     }
     if middle < MIN_MEDIAN_METERS {

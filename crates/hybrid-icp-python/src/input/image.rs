@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hicp_io::{LengthUnit, MaskRule};
+use hicp_io::{IoError, LengthUnit, MaskRule, ReadLimits};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
@@ -62,6 +62,8 @@ pub(crate) fn read_mask_png(py: Python<'_>, path: PathBuf) -> PyResult<Matrix<bo
 /// ------
 /// FileError
 ///     If the file cannot be read, is not such an image, or has integers and `scale` is missing.
+/// InputError
+///     If `scale` is wrong, or the depths in it cannot be meters.
 #[pyfunction]
 #[pyo3(signature = (path, *, scale = None))]
 pub(crate) fn read_depth(
@@ -69,9 +71,21 @@ pub(crate) fn read_depth(
     path: PathBuf,
     scale: Option<f64>,
 ) -> PyResult<Matrix<f32>> {
-    py.detach(|| hicp_io::read_depth(&path, scale.map(|meters| meters * 1000.0)))
-        .map(|image| depth::image(image.width(), image.pixels()))
-        .map_err(errors::file)
+    let millimeters = scale.map(depth::millimeters).transpose()?;
+    let image = py.detach(|| {
+        let raw = ReadLimits::DEFAULT.read_raw_depth(&path)?;
+        if millimeters.is_none() && !raw.is_float() {
+            let expected = "floating-point meters, or scale= (meters per unit), such as 0.001 for \
+                            millimeters";
+            return Err(IoError::new(path, None, "integers", expected));
+        }
+        raw.scaled(millimeters)
+    });
+    let image = image.map_err(errors::file)?;
+    if let Some(scale) = scale {
+        depth::check(&image, &depth::advice_on(scale))?;
+    }
+    Ok(depth::image(image.width(), image.pixels()))
 }
 
 /// Reads a mask from a file of any supported format.
