@@ -64,7 +64,7 @@ pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -
     ))
 }
 
-/// Returns anything with `__array__`, such as a tensor or a picture, as a NumPy array.
+/// Returns anything that NumPy reads as an array, such as a tensor or a picture, as a NumPy array.
 ///
 /// Masked arrays are refused, because NumPy would ignore their mask. If the conversion fails, as it
 /// does for a tensor on a GPU, the error has the advice of its library.
@@ -78,7 +78,7 @@ pub(crate) fn as_array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<B
         }
         return Ok(value.clone());
     }
-    if !value.hasattr("__array__")? {
+    if !value.hasattr("__array__")? && !value.hasattr("__array_interface__")? {
         return Ok(value.clone());
     }
     let numpy = value.py().import("numpy")?;

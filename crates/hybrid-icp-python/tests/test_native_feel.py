@@ -226,3 +226,34 @@ def test_meshes_and_images_of_other_libraries_are_read(scene):
         observation = hi.Observation.from_open3d(depth, Intrinsic(scene.camera), scene.mask)
         assert np.allclose(observation.depth, scene.depth, atol=6e-4)
         assert observation.camera == scene.camera
+
+
+def test_pictures_of_pil_and_other_types_of_arrays_are_read(scene):
+    pil = pytest.importorskip("PIL.Image")
+    depth = np.round(scene.depth * 1000).astype(np.uint16)
+    masks = [scene.mask.astype(int), scene.mask.astype(np.int32) * 255, pil.fromarray(scene.mask)]
+    images = [depth.astype(np.int32), depth.astype(">u2"), pil.fromarray(depth)]
+    expected = hi.Observation(depth, scene.mask, scene.camera, scale=0.001)
+    for image, mask in zip(images, masks):
+        read = hi.Observation(image, mask, scene.camera, scale=0.001)
+        assert np.array_equal(read.depth, expected.depth)
+        assert np.array_equal(read.mask, scene.mask)
+    half = scene.depth.astype(np.float16)
+    assert np.array_equal(hi.DepthImage(half).to_numpy(), half.astype(np.float32))
+    for mask in (scene.mask.astype(int) * 3, scene.mask.astype(int) + 254):
+        with pytest.raises(hi.InputError, match="mask is an array of int64 .* 0 and 1, or 0 and 255"):
+            hi.Observation(scene.depth, mask, scene.camera)
+
+
+def test_sequences_and_scenes_are_read(scene):
+    size = np.array([320, 240])
+    for pair in (size, size.tolist()):
+        assert hi.Camera.from_K(scene.camera.K, pair) == scene.camera
+    axes = np.array([[[0, 0, 1], [0.02, -0.01, 0]]])
+    for symmetry_axes in (axes, axes.tolist(), [tuple(axes[0])]):
+        model = hi.Model(scene.model.vertices, scene.model.faces, symmetry_axes=symmetry_axes)
+        assert np.allclose(model.__getnewargs_ex__()[1]["symmetry_axes"], axes)
+    trimesh = pytest.importorskip("trimesh")
+    mesh = trimesh.Trimesh(scene.model.vertices, scene.model.faces, process=False)
+    model = hi.Model.from_trimesh(trimesh.Scene([mesh, mesh]), unit="m")
+    assert len(model.faces) == 2 * len(scene.model.faces)

@@ -9,7 +9,7 @@ from ._results import Alignment, IterationEvent, RegimeEvent, Result, Sequential
 __all__ = ['Camera', 'DatasetRefiner', 'DepthImage', 'Fuser', 'Model', 'Observation', 'Pipeline', 'PoseEstimate', 'SequentialEstimator', 'Tracker', 'add', 'adi', 'align', 'fuse', 'mspd', 'mssd', 'mve', 'parts', 'point_to_plane_step', 'point_to_point_step', 'read_cloud', 'read_depth', 'read_depth_png', 'read_images', 'read_mask', 'read_mask_png', 'read_pose', 'render_depth', 'result_header', 'run_program', 'vsd']
 _Array = npt.NDArray[np.float64]
 _Unit = Literal['m', 'mm', 'cm']
-_Axis = tuple[Sequence[float], Sequence[float]]
+_Axes = Union[npt.ArrayLike, Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]]
 _Path = Union[str, os.PathLike[str]]
 _Fields = Union[Mapping[str, object], Sequence[str]]
 _Part = Union[str, Mapping[str, object]]
@@ -60,7 +60,7 @@ class Camera:
         ...
 
     @staticmethod
-    def from_K(K: npt.ArrayLike, size: tuple[int, int]) -> Camera:
+    def from_K(K: npt.ArrayLike, size: Sequence[int]) -> Camera:
         """Creates a camera from a calibration matrix.
 
         Parameters
@@ -82,7 +82,7 @@ class Camera:
         """
 
     @staticmethod
-    def from_file(path: _Path, size: tuple[int, int]) -> Camera:
+    def from_file(path: _Path, size: Sequence[int]) -> Camera:
         """Reads a camera from a file of BOP, ROS, OpenCV, RealSense, Open3D or NumPy.
 
         Parameters
@@ -144,6 +144,17 @@ class _HasArray(Protocol):
     def __array__(self, /) -> npt.NDArray[Any]:
         ...
 
+class _HasArrayInterface(Protocol):
+
+    @property
+    def __array_interface__(self) -> Any:
+        ...
+
+class _HasScene(Protocol):
+
+    def to_mesh(self) -> Any:
+        ...
+
 class _HasMesh(Protocol):
 
     @property
@@ -153,9 +164,9 @@ class _HasMesh(Protocol):
     @property
     def faces(self) -> Any:
         ...
-_Depth = Union[npt.NDArray[np.float32], npt.NDArray[np.float64], npt.NDArray[np.uint16], _HasArray]
-_Mask = Union[npt.NDArray[np.bool_], npt.NDArray[np.uint8], _HasArray]
-_Color = Union[npt.NDArray[np.uint8], _HasArray]
+_Depth = Union[npt.NDArray[np.floating[Any]], npt.NDArray[np.integer[Any]], _HasArray, _HasArrayInterface]
+_Mask = Union[npt.NDArray[np.bool_], npt.NDArray[np.integer[Any]], _HasArray, _HasArrayInterface]
+_Color = Union[npt.NDArray[np.uint8], _HasArray, _HasArrayInterface]
 _Textures = tuple[Sequence[npt.NDArray[np.uint8]], npt.ArrayLike, npt.ArrayLike]
 
 @final
@@ -168,10 +179,10 @@ class DepthImage:
     Parameters
     ----------
     depth : numpy.ndarray, shape (H, W)
-        Depth along the optical axis: float32 (or float64) meters, or uint16 with `scale`. Pixels
-        without a measurement are 0, negative or NaN.
+        Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
+        more bits with `scale`. Pixels without a measurement are 0, negative or NaN.
     scale : float, optional
-        Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
+        Meters per unit of an image of integers, such as 0.001; BOP's `depth_scale` divided by 1000.
 
     Raises
     ------
@@ -286,9 +297,9 @@ class Model:
     symmetries : array_like, shape (N, 4, 4), optional
         Discrete symmetries: rigid motions of the object frame that do not change its appearance,
         without the identity.
-    symmetry_axes : sequence of (axis, offset), optional
-        Continuous symmetries: any rotation around the line through `offset` along `axis`. Both
-        have three numbers.
+    symmetry_axes : array_like, shape (N, 2, 3), optional
+        Continuous symmetries as pairs (axis, offset): any rotation around the line through the
+        offset, in `unit`, along the axis.
     colors : array_like of uint8, shape (V, 3), optional
         Red, green and blue of each vertex, or textures as a tuple (images, indices, corners): a
         list of (H, W, 3) arrays of uint8, the image of each face, and its corners in the image,
@@ -303,11 +314,11 @@ class Model:
     Model(4 vertices, 2 faces, diameter 0.2828 m)
     """
 
-    def __new__(cls, vertices: npt.ArrayLike, faces: npt.ArrayLike, *, unit: _Unit='m', samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: Sequence[_Axis]=..., colors: npt.ArrayLike | _Textures | None=None) -> Model:
+    def __new__(cls, vertices: npt.ArrayLike, faces: npt.ArrayLike, *, unit: _Unit='m', samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: _Axes=..., colors: npt.ArrayLike | _Textures | None=None) -> Model:
         ...
 
     @staticmethod
-    def from_file(path: _Path, *, unit: _Unit, samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: Sequence[_Axis]=...) -> Model:
+    def from_file(path: _Path, *, unit: _Unit, samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: _Axes=...) -> Model:
         """Reads a mesh and its colors from a GLB, glTF, OBJ, OFF, PLY or STL file.
 
         Colors that cannot be used are left out (`has_color`).
@@ -353,14 +364,15 @@ class Model:
         """
 
     @staticmethod
-    def from_trimesh(mesh: _HasMesh, *, unit: _Unit, samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: Sequence[_Axis]=...) -> Model:
+    def from_trimesh(mesh: _HasMesh | _HasScene, *, unit: _Unit, samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: _Axes=...) -> Model:
         """Creates a model from a mesh of trimesh, or from anything with `vertices` and `faces`.
 
         The colors of its vertices or its texture are kept.
 
         Parameters
         ----------
-        mesh : trimesh.Trimesh
+        mesh : trimesh.Trimesh or trimesh.Scene
+            The meshes of a scene are one object.
         unit : {"m", "mm", "cm"}
             Unit of its coordinates.
         samples, diameter, symmetries, symmetry_axes
@@ -428,14 +440,16 @@ class Observation:
     Parameters
     ----------
     depth : DepthImage or numpy.ndarray, shape (H, W)
-        Depth along the optical axis: float32 (or float64) meters, or uint16 with `scale`. Pixels
-        without a measurement are 0, negative or NaN. A `DepthImage` is shared, not copied.
+        Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
+        more bits with `scale`. Pixels without a measurement are 0, negative or NaN. A `DepthImage`
+        is shared, not copied.
     mask : numpy.ndarray of bool or uint8, shape (H, W), or None
-        Nonzero on the object. `None` selects every pixel.
+        Nonzero on the object. `None` selects every pixel. Other integers must be 0 and 1, or 0 and
+        255.
     camera : Camera
         A camera for images of this size.
     scale : float, optional
-        Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
+        Meters per unit of an image of integers, such as 0.001; BOP's `depth_scale` divided by 1000.
     color : numpy.ndarray of uint8, shape (H, W, 3), optional
         Red, green and blue of the same pixels. It decides where depth alone is ambiguous, with a
         model that has colors (`Model.has_color`). Only `Pipeline("color")`, custom pipelines with

@@ -79,10 +79,10 @@ impl PyCamera {
     #[staticmethod]
     #[pyo3(name = "from_K")]
     #[allow(non_snake_case)]
-    fn from_k(K: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<Self> {
+    fn from_k(K: &Bound<'_, PyAny>, size: [u32; 2]) -> PyResult<Self> {
         let expected = "a (3, 3) matrix [fx 0 cx; 0 fy cy; 0 0 1], pixels";
         let (numbers, _) = array::numbers::<f64>(K, &[Some(3), Some(3)], "K", expected)?;
-        PinholeCamera::from_matrix(&Matrix3::from_row_slice(&numbers), size.0, size.1)
+        PinholeCamera::from_matrix(&Matrix3::from_row_slice(&numbers), size[0], size[1])
             .map(Self)
             .map_err(errors::input)
     }
@@ -105,8 +105,8 @@ impl PyCamera {
     /// FileError
     ///     If the file cannot be read, has no camera, or has lens distortion.
     #[staticmethod]
-    fn from_file(py: Python<'_>, path: PathBuf, size: (u32, u32)) -> PyResult<Self> {
-        let file = py.detach(|| hicp_io::read_camera(&path, size));
+    fn from_file(py: Python<'_>, path: PathBuf, size: [u32; 2]) -> PyResult<Self> {
+        let file = py.detach(|| hicp_io::read_camera(&path, size.into()));
         let file = file.map_err(errors::file)?;
         match file.distortion {
             None => Ok(Self(file.camera)),

@@ -5,15 +5,17 @@ use std::sync::Arc;
 
 use hybrid_icp::core::{DepthImage, Isometry3, Mask};
 use numpy::ndarray::ArrayView2;
-use numpy::{PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{
+    AllowTypeChange, PyArrayDescrMethods, PyArrayLike2, PyReadonlyArray2, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, unexpected};
 use crate::errors::{self, InputError};
 use crate::input::camera::PyCamera;
 
-const EXPECTED_DEPTH: &str =
-    "an (H, W) array of float32 meters, or of uint16 together with scale= (meters per unit)";
+const EXPECTED_DEPTH: &str = "an (H, W) array of float32 meters, or of uint16 or int32 together with scale= (meters per unit)";
 
 /// The largest median depth accepted, meters. Larger values are probably millimeters: no camera
 /// measures below 100 mm or beyond 100 m.
@@ -36,10 +38,10 @@ const GRID: usize = 64;
 /// Parameters
 /// ----------
 /// depth : numpy.ndarray, shape (H, W)
-///     Depth along the optical axis: float32 (or float64) meters, or uint16 with `scale`. Pixels
-///     without a measurement are 0, negative or NaN.
+///     Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
+///     more bits with `scale`. Pixels without a measurement are 0, negative or NaN.
 /// scale : float, optional
-///     Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
+///     Meters per unit of an image of integers, such as 0.001; BOP's `depth_scale` divided by 1000.
 ///
 /// Raises
 /// ------
@@ -182,26 +184,34 @@ fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
         return Err(unexpected("depth", value, EXPECTED_DEPTH));
     }
     let value = &array::aligned(value)?;
-    if let Ok(meters) = value.extract::<PyReadonlyArray2<'_, f32>>() {
-        no_scale(scale, value)?;
-        convert(&meters.as_array(), |z| z, ADVICE)
-    } else if let Ok(meters) = value.extract::<PyReadonlyArray2<'_, f64>>() {
-        no_scale(scale, value)?;
-        convert(&meters.as_array(), narrow, ADVICE)
-    } else if let Ok(units) = value.extract::<PyReadonlyArray2<'_, u16>>() {
-        let scale = scale.ok_or_else(|| {
-            InputError::new_err(format!(
-                "depth is {} without scale=, expected {EXPECTED_DEPTH}, such as scale=0.001 for \
-                 millimeters",
-                array::describe(value)
-            ))
-        })?;
-        // The same rounding as for depth PNGs: units times millimeters per unit, then to meters.
-        let millimeters = millimeters(scale)?;
-        let meters = |z| narrow(f64::from(z) * millimeters / 1000.0);
-        convert(&units.as_array(), meters, &advice_on(scale))
-    } else {
-        Err(unexpected("depth", value, EXPECTED_DEPTH))
+    // Types other than these three are rare, so NumPy converts them.
+    let any = || value.extract::<PyArrayLike2<'_, f64, AllowTypeChange>>();
+    match (array.dtype().kind(), array.dtype().itemsize()) {
+        (b'f', _) => {
+            no_scale(scale, array)?;
+            if let Ok(meters) = value.extract::<PyReadonlyArray2<'_, f32>>() {
+                return convert(&meters.as_array(), |z| z, ADVICE);
+            }
+            convert(&any()?.as_array(), narrow, ADVICE)
+        }
+        (b'i' | b'u', 2..) => {
+            let scale = scale.ok_or_else(|| {
+                InputError::new_err(format!(
+                    "depth is {} without scale=, expected {EXPECTED_DEPTH}, such as scale=0.001 \
+                     for millimeters",
+                    array::describe(array)
+                ))
+            })?;
+            // The same rounding as for depth PNGs: units times millimeters per unit, then to
+            // meters.
+            let (millimeters, advice) = (millimeters(scale)?, advice_on(scale));
+            let meters = |z: f64| narrow(z * millimeters / 1000.0);
+            if let Ok(units) = value.extract::<PyReadonlyArray2<'_, u16>>() {
+                return convert(&units.as_array(), |z| meters(f64::from(z)), &advice);
+            }
+            convert(&any()?.as_array(), meters, &advice)
+        }
+        _ => Err(unexpected("depth", array, EXPECTED_DEPTH)),
     }
 }
 
@@ -225,16 +235,34 @@ pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyRe
     let Some(value) = value else {
         return Ok(Mask::full(depth.width(), depth.height()));
     };
-    let expected = "an (H, W) array of bool or uint8, not zero on the object";
+    let expected = "an (H, W) array of bool or uint8, not zero on the object, or of other integers \
+                    that are 0 and 1, or 0 and 255";
     let value = &array::as_array("mask", value)?;
-    let (set, size) = if let Ok(mask) = value.extract::<PyReadonlyArray2<'_, bool>>() {
-        (array::row_major(&mask.as_array()), size(&mask.as_array())?)
-    } else if let Ok(mask) = value.extract::<PyReadonlyArray2<'_, u8>>() {
+    let refuse = || unexpected("mask", value, expected);
+    let kind = value.cast::<PyUntypedArray>().map_err(|_| refuse())?;
+    let kind = kind.dtype().kind();
+    let bytes = match kind {
+        // Pictures of PIL have other bytes than 0 and 1 as bool, which are no bool of Rust.
+        b'b' => value.call_method1("view", ("uint8",))?,
+        _ => value.clone(),
+    };
+    let (set, size) = if let Ok(mask) = bytes.extract::<PyReadonlyArray2<'_, u8>>() {
         let mask = mask.as_array();
-        warn_of_labels(value, &mask)?;
+        if kind != b'b' {
+            warn_of_labels(value, &mask)?;
+        }
+        let set = array::row_major(&mask).iter().map(|m| *m != 0).collect();
+        (set, size(&mask)?)
+    } else if matches!(kind, b'i' | b'u')
+        && let Ok(mask) = value.extract::<PyArrayLike2<'_, i64, AllowTypeChange>>()
+        && let mask = mask.as_array()
+        && [1, 255]
+            .iter()
+            .any(|on| mask.iter().all(|m| *m == 0 || m == on))
+    {
         (mask.iter().map(|m| *m != 0).collect(), size(&mask)?)
     } else {
-        return Err(unexpected("mask", value, expected));
+        return Err(refuse());
     };
     if size != (depth.width(), depth.height()) {
         return Err(InputError::new_err(format!(
@@ -285,7 +313,7 @@ fn no_scale(scale: Option<f64>, depth: &Bound<'_, PyAny>) -> PyResult<()> {
         None => Ok(()),
         Some(scale) => Err(InputError::new_err(format!(
             "scale={scale} was passed with depth as {}, which is in meters: expected scale= only \
-             with uint16",
+             with integers",
             array::describe(depth)
         ))),
     }

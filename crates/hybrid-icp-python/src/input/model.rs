@@ -42,9 +42,9 @@ use crate::input::color;
 /// symmetries : array_like, shape (N, 4, 4), optional
 ///     Discrete symmetries: rigid motions of the object frame that do not change its appearance,
 ///     without the identity.
-/// symmetry_axes : sequence of (axis, offset), optional
-///     Continuous symmetries: any rotation around the line through `offset` along `axis`. Both
-///     have three numbers.
+/// symmetry_axes : array_like, shape (N, 2, 3), optional
+///     Continuous symmetries as pairs (axis, offset): any rotation around the line through the
+///     offset, in `unit`, along the axis.
 /// colors : array_like of uint8, shape (V, 3), optional
 ///     Red, green and blue of each vertex, or textures as a tuple (images, indices, corners): a
 ///     list of (H, W, 3) arrays of uint8, the image of each face, and its corners in the image,
@@ -74,7 +74,7 @@ struct Options<'a, 'py> {
     samples: usize,
     diameter: Option<f64>,
     symmetries: Option<&'a Bound<'py, PyAny>>,
-    axes: Vec<([f64; 3], [f64; 3])>,
+    axes: Vec<[[f64; 3]; 2]>,
 }
 
 #[pymethods]
@@ -90,7 +90,7 @@ impl PyModel {
         samples: usize,
         diameter: Option<f64>,
         symmetries: Option<&Bound<'_, PyAny>>,
-        symmetry_axes: Vec<([f64; 3], [f64; 3])>,
+        symmetry_axes: Vec<[[f64; 3]; 2]>,
         colors: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let options = Options::new(unit, samples, diameter, symmetries, symmetry_axes)?;
@@ -133,7 +133,7 @@ impl PyModel {
         samples: usize,
         diameter: Option<f64>,
         symmetries: Option<&Bound<'_, PyAny>>,
-        symmetry_axes: Vec<([f64; 3], [f64; 3])>,
+        symmetry_axes: Vec<[[f64; 3]; 2]>,
     ) -> PyResult<Self> {
         let options = Options::new(unit, samples, diameter, symmetries, symmetry_axes)?;
         let unit = options.unit;
@@ -183,7 +183,8 @@ impl PyModel {
     ///
     /// Parameters
     /// ----------
-    /// mesh : trimesh.Trimesh
+    /// mesh : trimesh.Trimesh or trimesh.Scene
+    ///     The meshes of a scene are one object.
     /// unit : {"m", "mm", "cm"}
     ///     Unit of its coordinates.
     /// samples, diameter, symmetries, symmetry_axes
@@ -201,8 +202,13 @@ impl PyModel {
         samples: usize,
         diameter: Option<f64>,
         symmetries: Option<&Bound<'_, PyAny>>,
-        symmetry_axes: Vec<([f64; 3], [f64; 3])>,
+        symmetry_axes: Vec<[[f64; 3]; 2]>,
     ) -> PyResult<Self> {
+        let is_scene = !mesh.hasattr("vertices")? && mesh.hasattr("to_mesh")?;
+        let mesh = match is_scene {
+            true => &mesh.call_method0("to_mesh")?,
+            false => mesh,
+        };
         let (vertices, faces) = (mesh.getattr("vertices")?, mesh.getattr("faces")?);
         let (vertices, faces) = (&vertices, &faces);
         let module = py.import("hybrid_icp._colors")?;
@@ -348,7 +354,7 @@ impl<'a, 'py> Options<'a, 'py> {
         samples: usize,
         diameter: Option<f64>,
         symmetries: Option<&'a Bound<'py, PyAny>>,
-        axes: Vec<([f64; 3], [f64; 3])>,
+        axes: Vec<[[f64; 3]; 2]>,
     ) -> PyResult<Self> {
         if samples > MAX_SAMPLES {
             return Err(InputError::new_err(format!(
@@ -386,7 +392,7 @@ impl<'a, 'py> Options<'a, 'py> {
             continuous: self
                 .axes
                 .iter()
-                .map(|(axis, offset)| {
+                .map(|[axis, offset]| {
                     let offset = Point3::from(offset.map(|x| x * scale));
                     SymmetryAxis::new(Vector3::from(*axis), offset).map_err(errors::input)
                 })

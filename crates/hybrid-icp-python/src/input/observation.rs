@@ -26,14 +26,16 @@ type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict
 /// Parameters
 /// ----------
 /// depth : DepthImage or numpy.ndarray, shape (H, W)
-///     Depth along the optical axis: float32 (or float64) meters, or uint16 with `scale`. Pixels
-///     without a measurement are 0, negative or NaN. A `DepthImage` is shared, not copied.
+///     Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
+///     more bits with `scale`. Pixels without a measurement are 0, negative or NaN. A `DepthImage`
+///     is shared, not copied.
 /// mask : numpy.ndarray of bool or uint8, shape (H, W), or None
-///     Nonzero on the object. `None` selects every pixel.
+///     Nonzero on the object. `None` selects every pixel. Other integers must be 0 and 1, or 0 and
+///     255.
 /// camera : Camera
 ///     A camera for images of this size.
 /// scale : float, optional
-///     Meters per unit of a uint16 image, such as 0.001; BOP's `depth_scale` divided by 1000.
+///     Meters per unit of an image of integers, such as 0.001; BOP's `depth_scale` divided by 1000.
 /// color : numpy.ndarray of uint8, shape (H, W, 3), optional
 ///     Red, green and blue of the same pixels. It decides where depth alone is ambiguous, with a
 ///     model that has colors (`Model.has_color`). Only `Pipeline("color")`, custom pipelines with
