@@ -474,6 +474,8 @@ impl PyPipeline {
 
     /// Refines poses of any objects in any images, on several threads.
     ///
+    /// It reads at most two items per thread ahead, so images can be loaded on the way.
+    ///
     /// Parameters
     /// ----------
     /// items : iterable of (Model, Observation, T_co)
@@ -485,6 +487,11 @@ impl PyPipeline {
     /// -------
     /// list of Result
     ///     In the order of the items, with the bits of single calls of `refine`.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     As for `refine`, with the index of the item. The remaining items are not refined.
     #[pyo3(signature = (items, threads = None))]
     fn refine_many<'py>(
         slf: &Bound<'py, Self>,

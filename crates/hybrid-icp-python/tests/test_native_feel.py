@@ -159,6 +159,24 @@ def test_many_items_have_the_bits_of_single_calls_in_order(scene):
     assert pipeline.refine_many([]) == []
 
 
+def test_many_items_are_read_on_demand_and_a_bad_one_is_named(scene):
+    pipeline, item = hi.Pipeline("local"), (scene.model, scene.observation, scene.true)
+    read = []
+
+    def items():
+        for index in range(50):
+            read.append(index)
+            yield item if index != 1 else (*item[:2], 2 * scene.true)
+
+    with pytest.raises(hi.InputError, match=r"items\[1\]: T_co\[3, 3\] is 2, expected 1"):
+        pipeline.refine_many(items(), threads=2)
+    assert len(read) <= 7
+    with pytest.raises(TypeError, match=r"items\[0\]: "):
+        pipeline.refine_many([(scene.model, scene.true)])
+    with pytest.raises(hi.InputError, match="threads is 0, expected 1 or more"):
+        pipeline.refine_many([item], threads=0)
+
+
 def test_an_overlay_and_residuals_show_where_the_pose_is(scene, result):
     painted = result.overlay(scene.observation)
     assert painted.shape == (240, 320, 3) and painted.dtype == np.uint8

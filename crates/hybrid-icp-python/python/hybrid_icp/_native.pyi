@@ -853,6 +853,8 @@ class Pipeline:
     def refine_many(self, items: Iterable[tuple[Model, Observation, npt.ArrayLike]], threads: int | None=None) -> list[Result]:
         """Refines poses of any objects in any images, on several threads.
 
+        It reads at most two items per thread ahead, so images can be loaded on the way.
+
         Parameters
         ----------
         items : iterable of (Model, Observation, T_co)
@@ -864,6 +866,11 @@ class Pipeline:
         -------
         list of Result
             In the order of the items, with the bits of single calls of `refine`.
+
+        Raises
+        ------
+        InputError
+            As for `refine`, with the index of the item. The remaining items are not refined.
         """
 
     def __reduce__(self) -> tuple[Callable[[str, str, list[str]], Pipeline], tuple[str, str, list[str]]]:
