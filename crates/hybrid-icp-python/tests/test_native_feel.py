@@ -1,6 +1,7 @@
 """Tests what Python users expect: pickles, foreign arrays, pictures and plain arguments."""
 
 import copy
+import json
 import math
 import pickle
 from concurrent.futures import ProcessPoolExecutor
@@ -175,6 +176,23 @@ def test_many_items_are_read_on_demand_and_a_bad_one_is_named(scene):
         pipeline.refine_many([(scene.model, scene.true)])
     with pytest.raises(hi.InputError, match="threads is 0, expected 1 or more"):
         pipeline.refine_many([item], threads=0)
+
+
+def test_results_are_plain_values_without_nan(scene):
+    wall = np.full_like(scene.depth, 0.7)
+    wall[scene.mask] = scene.depth[scene.mask]
+    wall[~scene.mask] = 0
+    cut = hi.Observation(wall, scene.mask, scene.camera)
+    result = hi.Pipeline("local").refine(scene.model, cut, scene.true)
+    assert math.isnan(result.evidence["contour"])
+    assert result.to_dict()["evidence"]["contour"] is None
+    points = scene.model.vertices
+    aligned = hi.align(points, points, method="point-to-point")
+    step = hi.SequentialEstimator(hi.Pipeline("local"), "average", scene.model, scene.true)
+    tracked = hi.Tracker(scene.model, scene.camera, scene.true).step(wall, 0)
+    for record in (result, aligned, step.step(scene.observation), tracked):
+        text = json.dumps(record.to_dict(), allow_nan=False)
+        assert set(json.loads(text)) == set(vars(record)) - {"model"}
 
 
 def test_an_overlay_and_residuals_show_where_the_pose_is(scene, result):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
@@ -39,12 +40,28 @@ class Alternative(TypedDict):
 def _plain(value: Any) -> Any:
     """Returns a value as `json.dumps` accepts it."""
     if isinstance(value, np.ndarray):
-        return value.tolist()
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     if isinstance(value, list):
         return [_plain(item) for item in value]
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
-    return value.to_dict() if isinstance(value, StageEvent) else value
+    return _plain(value.to_dict()) if isinstance(value, StageEvent) else value
+
+
+class _Record:
+    """A result that can be written as JSON."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns all attributes but a model as plain Python values that `json.dumps` accepts.
+
+        Returns
+        -------
+        dict
+            The attributes by name; matrices as nested lists, and NaN as None.
+        """
+        return {key: _plain(value) for key, value in vars(self).items() if key != "model"}
 
 
 def _translation(T: _Array) -> str:
@@ -164,7 +181,7 @@ class StageEvent:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result:
+class Result(_Record):
     """The result of a refinement: a pose, its score, and the stages that ran.
 
     If the pose could not be refined, `T_co` has the numbers that were passed, and `outcome` is
@@ -277,16 +294,6 @@ class Result:
         """Returns `True` if the pose was refined. If not, the pose is the initial one."""
         return self.outcome == "refined"
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns all attributes but the model as plain Python values that `json.dumps` accepts.
-
-        Returns
-        -------
-        dict
-            The attributes by name; matrices as nested lists.
-        """
-        return {key: _plain(value) for key, value in vars(self).items() if key != "model"}
-
     def overlay(
         self,
         observation: Observation,
@@ -365,7 +372,7 @@ class Result:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Alignment:
+class Alignment(_Record):
     """The result of a registration of two point clouds, from `align`.
 
     If the pose could not be refined, `T_ts` has the numbers that were passed, and `outcome` is
@@ -406,7 +413,7 @@ class Alignment:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SequentialStep:
+class SequentialStep(_Record):
     """The pose of the object after one image, in the camera frame of that image.
 
     Attributes
@@ -441,7 +448,7 @@ class SequentialStep:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tracked:
+class Tracked(_Record):
     """The pose of a tracked object in an image.
 
     Attributes
