@@ -1,9 +1,11 @@
 //! Registration of point clouds.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use hicp_io::{LengthUnit, PointCloud};
 use hybrid_icp::core::{Cloud, Isometry3, Point3, UnitVector3};
+use hybrid_icp::icp::{IterationEvent, Observer};
 use hybrid_icp::{CloudOptions, Registration};
 use pyo3::prelude::*;
 
@@ -14,7 +16,7 @@ use crate::results;
 /// Registers two point clouds: finds the pose that moves the source onto the target.
 ///
 /// Points that are not finite are skipped, with a warning in the result. Absent normals are
-/// estimated if the method needs them, which is a warning, too.
+/// estimated if the method needs them, which is a warning, too. Ctrl-C stops it.
 ///
 /// Parameters
 /// ----------
@@ -71,19 +73,17 @@ pub(crate) fn align<'py>(
     let source = Points::read(source, source_normals, "source")?;
     let target = Points::read(target, target_normals, "target")?;
     let init = match T_ts {
-        Some(pose) => array::motion(pose, "T_ts")?,
+        Some(pose) => array::motion_of_cloud(pose, "T_ts")?,
         None => Motion::new(Isometry3::identity()),
     };
     let alignment = py.detach(|| -> PyResult<_> {
         let source = source.cloud(&options.for_source_of(method))?;
         let target = target.cloud(&options)?;
         let mut pipeline = method.build(max_distance);
-        Ok(hybrid_icp::align(
-            &source,
-            &target,
-            &init.isometry,
-            &mut pipeline,
-        ))
+        let mut signals = Signals(Ok(()));
+        let (init, observer) = (&init.isometry, &mut signals);
+        let found = hybrid_icp::align_observed(&source, &target, init, &mut pipeline, observer);
+        signals.0.map(|()| found)
     })?;
     results::alignment(py, &alignment, &init)
 }
@@ -124,6 +124,21 @@ pub(crate) fn read_cloud(
     let normals = normals.map(|normals| normals.iter().flat_map(|n| [n.x, n.y, n.z]).collect());
     let matrix = |numbers| Matrix::new(3, numbers);
     Ok((matrix(points), normals.map(matrix)))
+}
+
+/// Stops at the exception of a signal handler, such as `KeyboardInterrupt`.
+struct Signals(PyResult<()>);
+
+impl Observer for Signals {
+    fn on_iteration(&mut self, _: &IterationEvent<'_>) -> ControlFlow<()> {
+        if self.0.is_ok() {
+            self.0 = Python::attach(|py| py.check_signals());
+        }
+        match self.0 {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        }
+    }
 }
 
 /// The arrays of a cloud.

@@ -182,8 +182,15 @@ impl Motion {
     }
 }
 
-/// Reads a rigid motion from a 4×4 matrix, meters.
+/// Reads the pose of an object or a camera from a 4×4 matrix, meters.
 pub(crate) fn motion(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Motion> {
+    let motion = motion_of_cloud(value, name)?;
+    check_meters(&motion.matrix, name)?;
+    Ok(motion)
+}
+
+/// Reads a rigid motion from a 4×4 matrix, meters. Clouds can be far from the origin.
+pub(crate) fn motion_of_cloud(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Motion> {
     let expected = "a (4, 4) float64 matrix [R t; 0 0 0 1], meters";
     let (numbers, _) = numbers::<f64>(value, &[Some(4), Some(4)], name, expected)?;
     rigid(&numbers, name)
@@ -203,9 +210,23 @@ pub(crate) fn motions(
             for entry in [3, 7, 11] {
                 matrix[entry] *= meters_per_unit;
             }
-            rigid(matrix, &format!("{name}[{index}]"))
+            let name = format!("{name}[{index}]");
+            check_meters(matrix, &name)?;
+            rigid(matrix, &name)
         })
         .collect()
+}
+
+/// Returns an error if the translation of a 4×4 matrix is probably in millimeters.
+fn check_meters(matrix: &[f64], name: &str) -> PyResult<()> {
+    let [x, y, z] = [matrix[3], matrix[7], matrix[11]];
+    if [x, y, z].iter().any(|t| t.abs() > MAX_TRANSLATION_METERS) {
+        return Err(InputError::new_err(format!(
+            "{name} looks like millimeters: its translation is ({x}, {y}, {z}), expected meters \
+             within ±{MAX_TRANSLATION_METERS}"
+        )));
+    }
+    Ok(())
 }
 
 /// Reads a rigid motion from 16 row-major numbers.
@@ -225,12 +246,6 @@ fn rigid(numbers: &[f64], name: &str) -> PyResult<Motion> {
     if translation.iter().any(|t| !t.is_finite()) {
         return Err(InputError::new_err(format!(
             "{name} has the translation ({x}, {y}, {z}), expected finite numbers in meters"
-        )));
-    }
-    if translation.iter().any(|t| t.abs() > MAX_TRANSLATION_METERS) {
-        return Err(InputError::new_err(format!(
-            "{name} looks like millimeters: its translation is ({x}, {y}, {z}), expected meters \
-             within ±{MAX_TRANSLATION_METERS}"
         )));
     }
     let entries = Matrix3::from_fn(|row, column| matrix[4 * row + column]);

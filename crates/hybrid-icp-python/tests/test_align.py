@@ -1,5 +1,9 @@
 """Registration of two point clouds."""
 
+import contextlib
+import signal
+import time
+
 import numpy as np
 import pytest
 
@@ -69,3 +73,35 @@ def test_a_cloud_becomes_an_observation(scene):
     image = hi.DepthImage.from_points(points, scene.camera, np.linalg.inv(moved))
     assert np.abs(image.to_numpy() - scene.depth).max() < 1e-5
     assert hi.Observation(image, image.to_numpy() > 0, scene.camera).n_measured == len(points)
+
+
+def test_clouds_can_be_far_from_the_origin():
+    far = np.array([0, 0, 4000.0])
+    pose_of_points = pose([0, 0, 0], -far)
+    source = surface()
+    result = hi.align(source, source - far, pose_of_points, method="point-to-point")
+    assert np.allclose(result.T_ts, pose_of_points, atol=1e-3)
+    camera = hi.Camera(100, 100, 31.5, 23.5, 64, 48)
+    image = hi.DepthImage.from_points(source + far, camera, pose_of_points)
+    assert 0.4 < image.to_numpy().max() < 0.6
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers of POSIX")
+def test_a_signal_stops_a_registration():
+    x, y = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 30_000))
+    points = np.stack([x, y, 0.02 * np.sin(40 * x) * np.cos(30 * y + 5 * x)], axis=1)
+    arguments = points, points, pose([0, 0, 0.5], [0.05, 0.05, 0])
+
+    def seconds():
+        start = time.monotonic()
+        with contextlib.suppress(KeyboardInterrupt):
+            hi.align(*arguments, method="point-to-point", max_distance=0.1)
+        return time.monotonic() - start
+
+    complete = seconds()
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, complete / 10)
+        assert seconds() < complete / 2
+    finally:
+        signal.signal(signal.SIGALRM, before)

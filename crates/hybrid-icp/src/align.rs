@@ -12,8 +12,8 @@ use hicp_core::{
     Vector3,
 };
 use hicp_icp::{
-    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, SmallMotion, Stage, Termination,
-    Workspace,
+    BoxedStage, Cascade, Icp, IterationLimit, Observer, Outcome, Session, SmallMotion, Stage,
+    Termination, Workspace,
 };
 use hicp_metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
 use hicp_raster::Rasterizer;
@@ -352,10 +352,20 @@ pub fn align<'a>(
     init: &Isometry3<f64>,
     pipeline: &mut (impl Stage + ?Sized),
 ) -> Alignment {
+    align_observed(source, target, init, pipeline, &mut ())
+}
+
+/// Registers two clouds as [`align`] does, and reports every step to an observer.
+pub fn align_observed<'a>(
+    source: impl Into<Source<'a>>,
+    target: impl Into<Target<'a>>,
+    init: &Isometry3<f64>,
+    pipeline: &mut (impl Stage + ?Sized),
+    observer: &mut dyn Observer,
+) -> Alignment {
     let (source, target) = (source.into(), target.into());
     let mut workspace = Workspace::new(Rasterizer::default());
-    let mut observer = ();
-    let mut session = Session::new(&mut workspace, &mut observer);
+    let mut session = Session::new(&mut workspace, observer);
     let outcome = pipeline.run(&Problem::new(source, target), init, &mut session);
     let mut clouds = Vec::new();
     if let Source::Cloud(cloud) = source {

@@ -98,6 +98,7 @@ pub use hicp_switch as switch;
 
 pub use align::{
     Alignment, CloudOptions, CloudSide, CloudWarning, NormalCount, Registration, align,
+    align_observed,
 };
 pub use batch::refine_batch;
 pub use calibration::Calibration;

@@ -1183,7 +1183,7 @@ def align(source: npt.ArrayLike, target: npt.ArrayLike, T_ts: npt.ArrayLike | No
     """Registers two point clouds: finds the pose that moves the source onto the target.
 
     Points that are not finite are skipped, with a warning in the result. Absent normals are
-    estimated if the method needs them, which is a warning, too.
+    estimated if the method needs them, which is a warning, too. Ctrl-C stops it.
 
     Parameters
     ----------

@@ -124,7 +124,8 @@ impl PyDepthImage {
         T_cp: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let points = array::triples(points, "points")?;
-        let pose = T_cp.map(|pose| array::motion(pose, "T_cp")).transpose()?;
+        let pose = T_cp.map(|pose| array::motion_of_cloud(pose, "T_cp"));
+        let pose = pose.transpose()?;
         let pose = pose.map_or_else(Isometry3::identity, |pose| pose.isometry);
         let image = DepthImage::from_points(points, &camera.0, &pose);
         check(&image, "divide the points by 1000")?;
