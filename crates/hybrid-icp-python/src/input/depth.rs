@@ -252,7 +252,10 @@ pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyRe
         if kind != b'b' {
             warn_of_labels(value, &mask)?;
         }
-        let set = array::row_major(&mask).iter().map(|m| *m != 0).collect();
+        let set = array::row_major(&mask)
+            .into_iter()
+            .map(|m| m != 0)
+            .collect();
         (set, size(&mask)?)
     } else if matches!(kind, b'i' | b'u')
         && let Ok(mask) = value.extract::<PyArrayLike2<'_, i64, AllowTypeChange>>()
