@@ -1,10 +1,14 @@
 //! Measures the tracker on simulated sequences of moving objects, with noise of 0 to 3 % of the
 //! depth and hands that pass in front.
 //!
-//! `cargo run --release -p hicp-tests --example tracking -- [tuning|mugs] [SEQUENCES] [trace]`
+//! `cargo run --release -p hicp-tests --example tracking -- [tuning|mugs] [still] [SEQUENCES]
+//! [trace]`
 //!
 //! - `tuning`: the tuning objects instead of the test objects.
 //! - `mugs`: two public mugs and a pitcher, of the shared data.
+//! - `still`: instead of moving objects, those that stand among others on a table, in twelve equal
+//!   images: simulated ones with noise of 0 to 3 %, with the systematic errors of a sensor, and on
+//!   the real frames. With `tuning`, the tuning objects.
 //! - `SEQUENCES`: their number, 200 if not given. Every third has no hand, a passing one, and one
 //!   that hides the object for 1 to 3 s.
 //! - `trace`: one line per frame.
@@ -12,14 +16,17 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use hicp_io::bop::Dataset;
 use hicp_sim::{
     ClutterView, DepthNoise, DepthSensor, Hand, MovingConfig, MovingScene, RelativeGaussian,
     Trajectory, perturb, stream,
 };
 use hicp_tests::household;
 use hicp_tests::mugs::public_mugs;
-use hybrid_icp::core::{Isometry3, Mask, Model, Observation, PinholeCamera, Point3};
-use hybrid_icp::score::mssd;
+use hicp_tests::tabletop::Tabletop;
+use hicp_tests::ycbv;
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3};
+use hybrid_icp::score::{ModelPoints, mssd};
 use hybrid_icp::{Preset, Refiner, TrackState, Tracked, Tracker, TrackerConfig};
 use rand::RngExt;
 
@@ -31,6 +38,8 @@ const REAPPEARED: f64 = 0.5;
 const FRAMES_TO_FIND: usize = 3;
 /// Noise below and above which sequences are counted apart, percent.
 const NOISE_PERCENT: f64 = 1.0;
+/// Number of equal images of an object that stands still.
+const STILL_FRAMES: usize = 12;
 
 /// The counts of one kind of sequence.
 #[derive(Default)]
@@ -57,6 +66,10 @@ fn main() -> Result<(), Failure> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let has = |word: &str| words.iter().any(|w| w == word);
     let sequences = words.iter().find_map(|w| w.parse().ok()).unwrap_or(200);
+    if has("still") {
+        let set = household(if has("tuning") { "tuning" } else { "test" })?;
+        return still(&Tabletop::new(&set)?, sequences as usize, has("trace"));
+    }
     let objects = if has("mugs") {
         public_mugs()?
     } else {
@@ -83,16 +96,63 @@ fn main() -> Result<(), Failure> {
         let (_, hand, fps) = &kinds[kind];
         bench.sequence(index, hand, *fps, &mut counts[kind])?;
     }
-    println!(
-        "| sequences | noise | frames | lost | tracking | wrong while tracking | found again | ms | lost, ms | `hybrid`, ms |"
-    );
-    println!("|---|---|---:|---:|---:|---:|---:|---:|---:|---:|");
+    print_head();
     for (counts, (name, ..)) in counts.into_iter().zip(kinds) {
         for (counts, noise) in counts.into_iter().zip(["0 to 1 %", "1 to 3 %"]) {
             counts.print(name, noise);
         }
     }
     Ok(())
+}
+
+/// Tracks objects that stand still among others.
+fn still(tabletop: &Tabletop, cases: usize, trace: bool) -> Result<(), Failure> {
+    let points = hicp_tests::points_of(tabletop);
+    print_head();
+    for (distorted, noise) in [(false, "0 to 3 %"), (true, "systematic errors")] {
+        let mut counts = Counts::default();
+        for seed in 0.. {
+            if counts.frames >= cases * STILL_FRAMES {
+                break;
+            }
+            let scene = match distorted {
+                true => tabletop.distorted_scene(seed)?,
+                false => tabletop.scene(seed)?,
+            };
+            for (index, seen) in (0..).zip(scene) {
+                if seen.visible_share < REAPPEARED {
+                    continue;
+                }
+                let start = seen.near(&mut stream(seed, &["still"], index), 1.0);
+                let object = (&tabletop.objects[seen.model].1, &points[seen.model]);
+                let image = (&seen.depth, seen.camera);
+                counts.still(object, image, &seen.truth, &start, trace)?;
+            }
+        }
+        counts.print("on a table", noise);
+    }
+    let Some(root) = ycbv::root() else {
+        println!("no ycbv dataset; set BOP_PATH to its folder");
+        return Ok(());
+    };
+    let mut counts = Counts::default();
+    for (index, instance) in (0..).zip(ycbv::instances(&Dataset::open(root)?)) {
+        let (truth, observation) = (&instance.truth, instance.observe());
+        let mut random = stream(index, &["still"], 0);
+        let start = perturb(&mut random, truth, 0.0062, 9.5_f64.to_radians());
+        let object = (&*instance.model, &ModelPoints::new(&instance.model));
+        let image = (observation.shared_depth(), *observation.camera());
+        counts.still(object, image, truth, &start, trace)?;
+    }
+    counts.print("on a table, YCB-Video", "real");
+    Ok(())
+}
+
+fn print_head() {
+    println!(
+        "| sequences | noise | frames | lost | tracking | wrong while tracking | found again | ms | lost, ms | `hybrid`, ms |"
+    );
+    println!("|---|---|---:|---:|---:|---:|---:|---:|---:|---:|");
 }
 
 impl Bench {
@@ -197,6 +257,35 @@ impl Bench {
 }
 
 impl Counts {
+    /// Tracks an object that stands still.
+    fn still(
+        &mut self,
+        (model, points): (&Model, &ModelPoints),
+        (depth, camera): (&Arc<DepthImage>, PinholeCamera),
+        truth: &Isometry3<f64>,
+        start: &Isometry3<f64>,
+        trace: bool,
+    ) -> Result<(), Failure> {
+        let mut tracker = Tracker::new(model.clone(), camera, TrackerConfig::default());
+        tracker.start(start);
+        let mut state = TrackState::Tracking;
+        for frame in 0..STILL_FRAMES {
+            let clock = Instant::now();
+            let tracked = tracker.step(depth, 1.0 / 30.0, None)?;
+            let ms = 1e3 * clock.elapsed().as_secs_f64();
+            self.tracker_ms.push(ms);
+            let lost = tracked.state == TrackState::Lost;
+            self.lost_ms.extend(Some(ms).filter(|_| lost));
+            let off = points.mssd(&tracked.camera_from_object, truth) / model.diameter();
+            self.frame(&tracked, off, state);
+            state = tracked.state;
+            if trace {
+                println!("{frame} {off:.3} d: {tracked:?}");
+            }
+        }
+        Ok(())
+    }
+
     fn frame(&mut self, tracked: &Tracked, off: f64, before: TrackState) {
         let lost = |state| state == TrackState::Lost;
         self.frames += 1;
@@ -217,13 +306,16 @@ impl Counts {
             middle => format!("{middle:.0}, {:.0}", self.lost_ms[self.lost_ms.len() - 1]),
         };
         println!(
-            "| {name} | {noise} | {} | {} | {:.1} % | {:.2} % | {found} | {:.2} | {lost} | {:.2} |",
+            "| {name} | {noise} | {} | {} | {:.1} % | {:.2} % | {found} | {:.2} | {lost} | {} |",
             self.frames,
             self.lost,
             percent(self.tracking),
             percent(self.wrong),
             median(&mut self.tracker_ms),
-            median(&mut self.hybrid_ms),
+            match median(&mut self.hybrid_ms) {
+                0.0 => "–".to_owned(),
+                middle => format!("{middle:.2}"),
+            },
         );
     }
 }

@@ -13,6 +13,12 @@ const MEDIAN: f64 = 0.6745;
 const CUT: f64 = 25.0;
 /// Confidence of a pose that is as good as a right one usually is.
 const SURE: f64 = 0.9;
+/// The same for a pose that was expected, if the noise is at most [`LOW_NOISE`].
+const LIKELY: f64 = 0.7;
+/// Confidence of a pose that was expected and is not certain.
+const EXPECTED: f64 = 0.3;
+/// Noise at which a wrong pose rarely agrees with the image, in diameters.
+const LOW_NOISE: f64 = 0.07;
 /// Factor by which the noise may exceed that of the images before.
 const MAX_RISE: f64 = 1.1;
 
@@ -102,9 +108,13 @@ impl Found {
     }
 
     /// Returns whether the image shows the object at the pose, given that it was expected there.
+    ///
+    /// The confidence excuses an unexplained surface around the object, such as a table.
     pub(super) fn explains(&self) -> bool {
         let ends = self.contour() > 0.2 || self.fills(0.06, 0.1);
-        self.evidence.agrees > 0.15 && self.fills(0.2, 0.5) && ends
+        let alone = ends && self.unexplained() < 0.5;
+        let agrees = self.evidence.agrees > 0.15 && self.contradiction() < 0.2;
+        agrees && (alone || self.confidence > EXPECTED)
     }
 
     /// Returns whether most of the object is hidden at the pose.
@@ -114,12 +124,16 @@ impl Found {
 
     /// Returns whether the pose is as good as a right one usually is.
     ///
-    /// A seen contour excuses an unexplained surface around the object, such as a table.
+    /// A seen contour excuses an unexplained surface around the object, such as a table. If the
+    /// noise is low, the contour need not be seen, because many sensors measure nothing next to
+    /// it. The object must only not be a small part of a larger surface.
     pub(super) fn is_sure(&self) -> bool {
-        let contour = self.contour();
-        let ends = contour > 0.6 || (contour > 0.45 && self.unexplained() < 0.15);
-        let fits = self.contradiction() < 0.1 && (ends || self.fills(0.04, 0.05));
-        self.explains() && fits && self.confidence >= SURE
+        let (contour, unexplained) = (self.contour(), self.unexplained());
+        let ends = contour > 0.6 || (contour > 0.45 && unexplained < 0.15);
+        let usual = (ends || self.fills(0.04, 0.05)) && self.confidence >= SURE;
+        let accurate = self.noise < LOW_NOISE && (contour > 0.2 || unexplained < 0.6);
+        let likely = accurate && self.confidence >= LIKELY;
+        self.explains() && self.contradiction() < 0.1 && (usual || likely)
     }
 
     /// Returns whether no other pose needs to be tried.

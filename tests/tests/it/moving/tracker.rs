@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use hicp_io::bop::Dataset;
 use hicp_sim::{DepthSensor, Hand, Household, MovingConfig, MovingScene, stream};
+use hicp_tests::tabletop::Tabletop;
+use hicp_tests::ycbv;
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, Point3, Translation3, TriMesh,
     UnitQuaternion, Vector3, se3,
 };
-use hybrid_icp::score::mssd;
+use hybrid_icp::score::{ModelPoints, mssd};
 use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
 
 const SECONDS: f64 = 1.0 / 30.0;
@@ -183,6 +186,76 @@ fn images_without_the_object_and_starts_that_are_not_finite_are_never_tracked() 
             }
         }
     }
+}
+
+/// Counts the states of objects that stand still: tracked, doubtful and lost, and those that are
+/// tracked at a wrong pose.
+#[derive(Debug, Default)]
+struct Standing {
+    states: [usize; 3],
+    wrong: usize,
+}
+
+impl Standing {
+    fn track(
+        &mut self,
+        model: &Arc<Model>,
+        (depth, camera): (&Arc<DepthImage>, PinholeCamera),
+        truth: &Isometry3<f64>,
+        start: &Isometry3<f64>,
+    ) {
+        let mut tracker = Tracker::new(Arc::clone(model), camera, TrackerConfig::default());
+        tracker.start(start);
+        let steps = (0..6).map(|_| tracker.step(depth, SECONDS, None).unwrap());
+        let last = steps.last().unwrap();
+        let off = ModelPoints::new(model).mssd(&last.camera_from_object, truth);
+        let tracking = last.state == TrackState::Tracking;
+        self.wrong += usize::from(tracking && off > 0.1 * model.diameter());
+        self.states[match last.state {
+            TrackState::Tracking => 0,
+            TrackState::Doubtful => 1,
+            TrackState::Lost => 2,
+        }] += 1;
+    }
+}
+
+#[test]
+fn an_object_among_others_on_a_table_is_followed() {
+    let tabletop = Tabletop::new(&Household::TUNING).unwrap();
+    let mut standing = Standing::default();
+    for (seed, distorted) in [(0, false), (4, false), (5, true), (12, true)] {
+        let scene = match distorted {
+            true => tabletop.distorted_scene(seed).unwrap(),
+            false => tabletop.scene(seed).unwrap(),
+        };
+        for (index, seen) in (0..).zip(scene) {
+            let model = Arc::new(tabletop.objects[seen.model].1.clone());
+            let start = seen.near(&mut stream(seed, &["standing"], index), 1.0);
+            standing.track(&model, (&seen.depth, seen.camera), &seen.truth, &start);
+        }
+    }
+    let [tracked, doubtful, lost] = standing.states;
+    assert!(lost <= 1 && tracked > 2 * doubtful, "{standing:?}");
+    assert_eq!(standing.wrong, 0, "{standing:?}");
+}
+
+/// The edges of real sensors are not measured, or off by pixels, and a table and other objects are
+/// always near.
+#[test]
+fn an_object_in_a_real_image_is_followed() {
+    let Some(root) = ycbv::root() else {
+        println!("no ycbv dataset; set BOP_PATH to its folder");
+        return;
+    };
+    let mut standing = Standing::default();
+    for instance in ycbv::instances(&Dataset::open(root).unwrap()) {
+        let (truth, observation) = (&instance.truth, instance.observe());
+        let image = (observation.shared_depth(), *observation.camera());
+        standing.track(&instance.model, image, truth, truth);
+    }
+    let [tracked, _, lost] = standing.states;
+    assert!(tracked >= 8 && lost <= 2, "{standing:?}");
+    assert_eq!(standing.wrong, 0, "{standing:?}");
 }
 
 #[test]
