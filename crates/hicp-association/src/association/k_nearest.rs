@@ -43,7 +43,7 @@ impl KNearest {
 }
 
 impl Default for KNearest {
-    /// Three of about 4,000 observed points.
+    /// Three of about 4,000 pixels of an image, or of all points of a cloud.
     fn default() -> Self {
         Self::new(3, Stride::AboutPoints(4000))
     }

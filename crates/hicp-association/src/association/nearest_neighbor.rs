@@ -23,7 +23,8 @@ use crate::stride::Stride;
 pub struct NearestNeighbor {
     /// Observed pixels that enter the index.
     ///
-    /// An index that fits the cache is several times faster, at hardly any loss of accuracy.
+    /// An index that fits the cache is several times faster, at hardly any loss of accuracy in an
+    /// image.
     pub targets: Stride,
     /// The index to search.
     pub index: SearchIndex,
@@ -85,7 +86,7 @@ impl NearestNeighbor {
 }
 
 impl Default for NearestNeighbor {
-    /// About 4,000 observed points in a box tree.
+    /// About 4,000 pixels of an image, or all points of a cloud, in a box tree.
     // Deviation: stride of C for nearest neighbors: §III-A.1 searches all of C. Here the tree has
     // about 4,000 points of it, because a small tree is faster to search at hardly any loss of
     // accuracy. `Stride::Pixels(1)` searches all.

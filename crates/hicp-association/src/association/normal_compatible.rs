@@ -46,7 +46,8 @@ impl NormalCompatible {
 }
 
 impl Default for NormalCompatible {
-    /// Within 45° (Pulli 1999), among the 10 closest of about 4,000 observed points.
+    /// Within 45° (Pulli 1999), among the 10 closest of about 4,000 pixels of an image, or of all
+    /// points of a cloud.
     fn default() -> Self {
         Self::new(45.0, 10, Stride::AboutPoints(4000))
     }

@@ -52,7 +52,8 @@ impl NormalShooting {
 }
 
 impl Default for NormalShooting {
-    /// Among the 10 closest of about 4,000 observed points, at any distance from the line.
+    /// Among the 10 closest of about 4,000 pixels of an image, or of all points of a cloud, at any
+    /// distance from the line.
     fn default() -> Self {
         Self::new(10, None, Stride::AboutPoints(4000))
     }

@@ -21,7 +21,10 @@ impl<T: PointIndex> ObservedPoints<T> {
     /// They are built once per target, stride and kind of index, and shared by all threads and
     /// hypotheses.
     pub(crate) fn of(target: Target<'_>, targets: Stride) -> Arc<Self> {
-        let stride = targets.pixels(target.n_surfels());
+        let stride = match (target, targets) {
+            (Target::Cloud(_), Stride::AboutPoints(_)) => 1,
+            _ => targets.pixels(target.n_surfels()),
+        };
         target.derived().get_or_build(u64::from(stride), || {
             let surfels = target.surfels(stride);
             // Surfels of observations and clouds are finite by construction.

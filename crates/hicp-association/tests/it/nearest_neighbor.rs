@@ -3,8 +3,8 @@
 use crate::support::{Numbers, RayCaster, cuboid, depth_image, observe_depth, sphere_depth};
 use hicp_association::{DataAssociation, NearestNeighbor, SearchIndex, Stride};
 use hicp_core::{
-    Context, Correspondences, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera,
-    Point3, Problem, RenderCache, RigidTransform, Surfel, UnitVector3, Vector3,
+    Cloud, Context, Correspondences, DepthImage, Isometry3, Mask, Model, Observation,
+    PinholeCamera, Point3, Problem, RenderCache, RigidTransform, Surfel, UnitVector3, Vector3,
 };
 
 const INDEXES: &[SearchIndex] = &[
@@ -185,6 +185,28 @@ fn pitfall_26_only_queries_that_are_not_finite_have_no_pair() {
             assert!(pairs.as_slice().iter().all(|p| p.distance().is_finite()));
         }
     }
+}
+
+#[test]
+fn about_so_many_points_are_all_points_of_a_cloud() {
+    let mut numbers = Numbers(205);
+    let target = Cloud::new(surfels(&mut numbers, 20_000, 0.5));
+    let source = Cloud::new(surfels(&mut numbers, 50, 0.5));
+    let mut renders = RenderCache::new(RayCaster);
+    let mut context = Context::new(Problem::new(&source, &target), &mut renders);
+    let mut associate = |targets| {
+        let mut pairs = Correspondences::new();
+        NearestNeighbor::new(targets, SearchIndex::default()).associate(
+            &mut context,
+            source.surfels(),
+            &Isometry3::identity(),
+            &mut pairs,
+        );
+        pairs
+    };
+    let all = associate(Stride::Pixels(1));
+    assert_eq!(associate(Stride::AboutPoints(10)), all);
+    assert_ne!(associate(Stride::Pixels(2)), all);
 }
 
 #[test]

@@ -136,7 +136,7 @@ pub(super) fn add(catalog: &mut Catalog) {
     });
 }
 
-const SEARCHED: &str = "observed points to search, about";
+const SEARCHED: &str = "pixels to search, about; all points of a cloud";
 
 fn searched(p: &mut Parameters<'_>) -> Result<Stride, PipelineError> {
     stride(p, 4000, SEARCHED)
