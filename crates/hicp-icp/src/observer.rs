@@ -53,6 +53,24 @@ pub struct IterationEvent<'a> {
     pub increment: &'a Isometry3<f64>,
 }
 
+impl<'a> IterationEvent<'a> {
+    /// Creates the event of an evaluated pose, for a custom stage; see [`Stage`](crate::Stage).
+    #[must_use]
+    pub fn new(
+        iteration: usize,
+        camera_from_object: &'a Isometry3<f64>,
+        evaluation: Evaluation,
+        increment: &'a Isometry3<f64>,
+    ) -> Self {
+        Self {
+            iteration,
+            camera_from_object,
+            evaluation,
+            increment,
+        }
+    }
+}
+
 /// The branch of a switch, counted from 0.
 ///
 /// The better the estimate agrees with the image, the lower its branch.
@@ -107,4 +125,21 @@ pub struct StageEvent<'a> {
     pub n_source: usize,
     /// The result of the stage.
     pub outcome: &'a Outcome,
+}
+
+impl<'a> StageEvent<'a> {
+    /// Creates the end of a custom stage without points and with "none" as the name of all
+    /// components; set the fields that it has.
+    #[must_use]
+    pub fn new(outcome: &'a Outcome) -> Self {
+        Self {
+            selection: "none",
+            association: "none",
+            filters: &[],
+            metric: "none",
+            stop_rules: &[],
+            n_source: 0,
+            outcome,
+        }
+    }
 }

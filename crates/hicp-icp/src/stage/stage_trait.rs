@@ -20,6 +20,54 @@ use crate::session::Session;
 ///   workspace are scratch.
 /// - A warm run (the same stage and workspace before, on inputs that are not larger) allocates
 ///   nothing on the heap.
+///
+/// A stage with its own loop reports to the observer, which can end it:
+///
+/// ```
+/// use hicp_association::{DataAssociation, NearestNeighbor};
+/// use hicp_core::{Correspondences, Isometry3, Problem};
+/// use hicp_icp::{Evaluation, IterationEvent, Outcome, Session, Stage, StageEvent, Termination};
+/// use hicp_metric::{ErrorMetric, PointToPoint};
+///
+/// /// Evaluates ten poses at most.
+/// #[derive(Default)]
+/// struct TenPoses {
+///     nearest: NearestNeighbor,
+///     pairs: Correspondences,
+/// }
+///
+/// impl Stage for TenPoses {
+///     fn run(
+///         &mut self,
+///         problem: &Problem<'_>,
+///         init: &Isometry3<f64>,
+///         session: &mut Session<'_>,
+///     ) -> Outcome {
+///         let ended = Termination::Custom("ten_poses");
+///         let source = problem.source().map_or(&[][..], |source| source.surfels());
+///         let (mut pose, mut outcome) = (*init, Outcome::kept(init, ended));
+///         for iteration in 0..10 {
+///             self.pairs.begin(&pose, source.len());
+///             let mut context = session.context(problem);
+///             self.nearest.associate(&mut context, source, &pose, &mut self.pairs);
+///             let Some(step) = PointToPoint.step(&self.pairs) else { break };
+///             if iteration > 0 {
+///                 outcome = Outcome::refined(pose, ended);
+///             }
+///             let evaluation = Evaluation { n_pairs: self.pairs.len(), mean_loss: step.mean_loss };
+///             let event = IterationEvent::new(iteration, &pose, evaluation, &step.increment);
+///             if session.observer.on_iteration(&event).is_break() {
+///                 break;
+///             }
+///             pose = step.increment * pose;
+///         }
+///         let mut event = StageEvent::new(&outcome);
+///         event.association = self.nearest.name();
+///         session.observer.on_stage_end(&event);
+///         outcome
+///     }
+/// }
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a stage",
     label = "this must implement `Stage`",

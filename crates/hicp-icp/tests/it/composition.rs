@@ -1,10 +1,11 @@
 //! Tests of stages made of stages, and of the outcomes that they combine to.
 
 use crate::script::support::{bits, pose};
-use crate::script::{Line, Scheduled, returned, run, scripted};
-use hicp_core::Isometry3;
+use crate::script::{Line, Log, Scheduled, returned, run, run_observed, scripted};
+use hicp_core::{Isometry3, Problem};
 use hicp_icp::{
-    Cascade, Divergence, Evaluation, IterationLimit, Outcome, Repeat, Stage, Termination, Verdict,
+    Cascade, Divergence, Evaluation, IterationEvent, IterationLimit, Outcome, Repeat, Session,
+    Stage, StageEvent, Termination, Verdict,
 };
 
 fn outcome(x: f64, verdict: Verdict, iterations: usize, loss: Option<f64>) -> Outcome {
@@ -255,4 +256,27 @@ fn every_termination_has_a_different_explanation() {
                 .all(|other| other.explain() != end.explain())
         );
     }
+}
+
+#[test]
+fn a_custom_stage_reports_to_the_observer() {
+    struct Reports;
+
+    impl Stage for Reports {
+        fn run(&mut self, _: &Problem<'_>, pose: &Isometry3<f64>, s: &mut Session<'_>) -> Outcome {
+            let outcome = outcome(0.0, LOST, 1, Some(2.0));
+            let evaluation = outcome.evaluation.unwrap();
+            let event = IterationEvent::new(7, pose, evaluation, pose);
+            assert!(s.observer.on_iteration(&event).is_continue());
+            let mut event = StageEvent::new(&outcome);
+            event.metric = "mine";
+            s.observer.on_stage_end(&event);
+            outcome
+        }
+    }
+
+    let mut log = Log::default();
+    let outcome = run_observed(&mut Reports, &Isometry3::identity(), &mut log);
+    assert_eq!(log.iterations, [(7, 0.0, outcome.evaluation.unwrap())]);
+    assert_eq!(log.stages, [(["none", "none", "mine"], 0, outcome)]);
 }
