@@ -8,7 +8,8 @@ use crate::outcome::{Evaluation, Outcome};
 
 /// Observes a run. All methods do nothing unless overridden.
 ///
-/// They are called per iteration or per stage, never per point.
+/// They are called per iteration or per stage, never per point. A tuple of up to eight observers
+/// passes every event to all of them, and breaks if one breaks.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an observer",
     label = "this must implement `Observer`",
@@ -38,6 +39,58 @@ pub trait Observer {
 
 /// Observes nothing.
 impl Observer for () {}
+
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<T: Observer + ?Sized> Observer for $pointer {
+            fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
+                (**self).on_iteration(event)
+            }
+
+            fn on_regime(&mut self, event: &RegimeEvent) {
+                (**self).on_regime(event);
+            }
+
+            fn on_stage_end(&mut self, event: &StageEvent<'_>) {
+                (**self).on_stage_end(event);
+            }
+        }
+    )+};
+}
+forward!(Box<T>, &mut T);
+
+macro_rules! all {
+    ($($member:ident),+) => {
+        #[allow(non_snake_case)]
+        impl<$($member: Observer),+> Observer for ($($member,)+) {
+            fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
+                let ($($member,)+) = self;
+                // Call all of them, also after one that breaks.
+                $(let $member = $member.on_iteration(event);)+
+                $($member?;)+
+                ControlFlow::Continue(())
+            }
+
+            fn on_regime(&mut self, event: &RegimeEvent) {
+                let ($($member,)+) = self;
+                $($member.on_regime(event);)+
+            }
+
+            fn on_stage_end(&mut self, event: &StageEvent<'_>) {
+                let ($($member,)+) = self;
+                $($member.on_stage_end(event);)+
+            }
+        }
+    };
+}
+all!(A);
+all!(A, B);
+all!(A, B, C);
+all!(A, B, C, D);
+all!(A, B, C, D, E);
+all!(A, B, C, D, E, F);
+all!(A, B, C, D, E, F, G);
+all!(A, B, C, D, E, F, G, H);
 
 /// An evaluated pose.
 #[derive(Clone, Copy, Debug)]

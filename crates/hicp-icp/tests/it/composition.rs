@@ -1,11 +1,13 @@
 //! Tests of stages made of stages, and of the outcomes that they combine to.
 
+use std::ops::ControlFlow;
+
 use crate::script::support::{bits, pose};
 use crate::script::{Line, Log, Scheduled, returned, run, run_observed, scripted};
 use hicp_core::{Isometry3, Problem};
 use hicp_icp::{
-    Cascade, Divergence, Evaluation, IterationEvent, IterationLimit, Outcome, Repeat, Session,
-    Stage, StageEvent, Termination, Verdict,
+    Cascade, Divergence, Evaluation, IterationEvent, IterationLimit, Observer, Outcome, Regime,
+    RegimeEvent, Repeat, Session, Stage, StageEvent, Termination, Verdict,
 };
 
 fn outcome(x: f64, verdict: Verdict, iterations: usize, loss: Option<f64>) -> Outcome {
@@ -279,4 +281,31 @@ fn a_custom_stage_reports_to_the_observer() {
     let outcome = run_observed(&mut Reports, &Isometry3::identity(), &mut log);
     assert_eq!(log.iterations, [(7, 0.0, outcome.evaluation.unwrap())]);
     assert_eq!(log.stages, [(["none", "none", "mine"], 0, outcome)]);
+}
+
+#[test]
+fn all_observers_receive_all_events_and_one_ends_the_run() {
+    struct Breaks;
+
+    impl Observer for Breaks {
+        fn on_iteration(&mut self, _: &IterationEvent<'_>) -> ControlFlow<()> {
+            ControlFlow::Break(())
+        }
+    }
+
+    let lines = [(100, Some(3.0)), (100, Some(2.0))];
+    let mut stage = scripted(&lines, IterationLimit(2));
+    let (mut first, mut last) = (Log::default(), Box::new(Log::default()));
+    let mut all = (&mut first, Breaks, &mut last);
+    let outcome = run_observed(&mut stage, &Isometry3::identity(), &mut all);
+    assert_eq!(outcome.termination, Termination::Stopped);
+    assert_eq!((first.iterations.len(), first.stages.len()), (1, 1));
+    assert_eq!(first.iterations, last.iterations);
+    assert_eq!(first.stages, last.stages);
+    let event = RegimeEvent {
+        regime: Regime::ALIGNED,
+        score: None,
+    };
+    (&mut first, ()).on_regime(&event);
+    assert_eq!(first.regimes, [event]);
 }
