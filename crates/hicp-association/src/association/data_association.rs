@@ -59,7 +59,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a data association",
     label = "this must implement `DataAssociation`",
-    note = "`Icp::association` accepts a `DataAssociation`, such as `Projective`, a pair of two, or a `Vec`"
+    note = "`Icp::association` accepts a `DataAssociation`, such as `Projective`, a tuple of two to eight, or a `Vec`"
 )]
 pub trait DataAssociation {
     /// Fills `pairs` at the candidate pose `camera_from_object`.
@@ -138,28 +138,45 @@ impl<T: DataAssociation> DataAssociation for Vec<T> {
     }
 }
 
-/// Joins the pairs of both members, in order. The number of candidates is the sum of theirs.
-impl<A: DataAssociation, B: DataAssociation> DataAssociation for (A, B) {
-    fn associate(
-        &mut self,
-        context: &mut Context<'_>,
-        source: &[Surfel],
-        camera_from_object: &Isometry3<f64>,
-        pairs: &mut Correspondences,
-    ) {
-        let selected = pairs.n_candidates();
-        self.0.associate(context, source, camera_from_object, pairs);
-        let candidates = pairs.n_candidates();
-        pairs.set_candidates(selected);
-        self.1.associate(context, source, camera_from_object, pairs);
-        pairs.set_candidates(candidates + pairs.n_candidates());
-    }
+macro_rules! joined {
+    ($($member:ident),+) => {
+        /// Joins the pairs of all members, in order. The number of candidates is the sum of theirs.
+        #[allow(non_snake_case)]
+        impl<$($member: DataAssociation),+> DataAssociation for ($($member,)+) {
+            fn associate(
+                &mut self,
+                context: &mut Context<'_>,
+                source: &[Surfel],
+                camera_from_object: &Isometry3<f64>,
+                pairs: &mut Correspondences,
+            ) {
+                let ($($member,)+) = self;
+                let selected = pairs.n_candidates();
+                let mut candidates = 0;
+                $(
+                    pairs.set_candidates(selected);
+                    $member.associate(context, source, camera_from_object, pairs);
+                    candidates += pairs.n_candidates();
+                )+
+                pairs.set_candidates(candidates);
+            }
 
-    fn name(&self) -> &'static str {
-        "joined"
-    }
+            fn name(&self) -> &'static str {
+                "joined"
+            }
 
-    fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
-        (self.0.unsupported(problem)).or_else(|| self.1.unsupported(problem))
-    }
+            fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+                let ($($member,)+) = self;
+                None$(.or_else(|| $member.unsupported(problem)))+
+            }
+        }
+    };
 }
+joined!(A);
+joined!(A, B);
+joined!(A, B, C);
+joined!(A, B, C, D);
+joined!(A, B, C, D, E);
+joined!(A, B, C, D, E, F);
+joined!(A, B, C, D, E, F, G);
+joined!(A, B, C, D, E, F, G, H);

@@ -411,9 +411,13 @@ fn joined_associations_add_up() {
         .collect();
     let candidates = first.n_candidates() + second.n_candidates();
     let members: Vec<Box<dyn DataAssociation>> = vec![Box::new(surface), Box::new(contour.clone())];
-    for join in [&mut (surface, contour) as &mut dyn DataAssociation, &mut {
-        members
-    }] {
+    let (s, c) = (surface.clone(), contour.clone());
+    let mut nested = (Vec::<Contour>::new(), (s,), c);
+    for join in [
+        &mut (surface, contour) as &mut dyn DataAssociation,
+        &mut { members },
+        &mut nested,
+    ] {
         let joined = of(join);
         assert_eq!(joined.as_slice(), expected);
         assert_eq!(joined.n_candidates(), candidates);

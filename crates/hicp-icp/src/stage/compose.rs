@@ -11,8 +11,9 @@ use crate::stage::stage_trait::Stage;
 /// A stage that diverges returns the pose that it accepted last, and the next stage starts there.
 /// If the first stage diverges in its first step, the second starts from the initial pose. If it
 /// diverges later, the second starts from the last pose before the divergence. Losses are never
-/// compared across stages. The stages can ask for the initial pose of the cascade
-/// ([`Session::cascade_init`]): `SelectAt::Cascade` selects there.
+/// compared across stages. The stages can read the initial pose of the cascade
+/// ([`Session::cascade_init`]): `SelectAt::Cascade` selects there. In a cascade inside of another,
+/// this is the initial pose of the inner one.
 ///
 /// The paper's cascade is `Cascade((point_to_point, point_to_plane))`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +49,10 @@ cascade!(A);
 cascade!(A, B);
 cascade!(A, B, C);
 cascade!(A, B, C, D);
+cascade!(A, B, C, D, E);
+cascade!(A, B, C, D, E, F);
+cascade!(A, B, C, D, E, F, G);
+cascade!(A, B, C, D, E, F, G, H);
 
 /// A cascade without stages keeps the initial pose as converged, for a branch of a switch.
 impl Stage for Cascade<()> {

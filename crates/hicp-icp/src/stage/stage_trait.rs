@@ -71,7 +71,7 @@ use crate::session::Session;
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a stage",
     label = "this must implement `Stage`",
-    note = "stages are `Icp` (whose five fields must implement `PointSelection`, `DataAssociation`, `OutlierFilter`, `ErrorMetric` and `StopRule`), `Cascade` of a tuple of one to four stages or of a `Vec`, `Repeat`, `Switch`, and compositions of them; a `Preset` becomes one by `.build()`"
+    note = "stages are `Icp` (whose five fields must implement `PointSelection`, `DataAssociation`, `OutlierFilter`, `ErrorMetric` and `StopRule`), `Cascade` of a tuple of up to eight stages or of a `Vec`, `Repeat`, `Switch`, and compositions of them; a `Preset` becomes one by `.build()`"
 )]
 pub trait Stage {
     /// Runs the stage from `init`, the initial `camera_from_object`.

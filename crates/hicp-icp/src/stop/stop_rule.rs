@@ -42,8 +42,9 @@ impl Judgment {
 
 /// Decides after every evaluation whether the stage continues and whether the pose is accepted.
 ///
-/// A tuple of up to six rules, or a `Vec` of any number, passes every iteration to all of them. The
-/// first rule that does not continue decides.
+/// A tuple of up to eight rules, or a `Vec` of any number, passes every iteration to all of them.
+/// The first rule that does not continue decides. `()` never ends a stage, which then runs until
+/// [`MAX_ITERATIONS`](crate::MAX_ITERATIONS).
 ///
 /// A rule can end a stage for a custom reason:
 ///
@@ -70,7 +71,7 @@ impl Judgment {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a stop rule",
     label = "this must implement `StopRule`",
-    note = "`Icp::stop` accepts a `StopRule`, a `Vec` of one type (for example `Vec<Box<dyn StopRule>>`), or a tuple of one to six of them"
+    note = "`Icp::stop` accepts a `StopRule`, `()`, a `Vec` of one type (for example `Vec<Box<dyn StopRule>>`), or a tuple of one to eight of them"
 )]
 pub trait StopRule {
     /// Starts a stage: rules with memory clear it.
@@ -114,6 +115,19 @@ macro_rules! forward {
     )+};
 }
 forward!(Box<T>, &mut T);
+
+/// Never ends a stage.
+impl StopRule for () {
+    fn check(&mut self, _: &Iteration<'_>, _: &Progress<'_>) -> Judgment {
+        Judgment::Continue
+    }
+
+    fn name(&self) -> &'static str {
+        "none"
+    }
+
+    fn names(&self, _: &mut Vec<&'static str>) {}
+}
 
 /// Passes every iteration to all rules, as tuples do. The first that does not continue decides.
 impl<T: StopRule> StopRule for Vec<T> {
@@ -172,3 +186,5 @@ any_of!(A, B, C);
 any_of!(A, B, C, D);
 any_of!(A, B, C, D, E);
 any_of!(A, B, C, D, E, F);
+any_of!(A, B, C, D, E, F, G);
+any_of!(A, B, C, D, E, F, G, H);

@@ -7,8 +7,8 @@ use hicp_core::Isometry3;
 use hicp_core::Iteration;
 use hicp_icp::Judgment;
 use hicp_icp::{
-    Divergence, Evaluation, IterationLimit, LossRule, Outcome, Progress, StopRule, Termination,
-    Verdict,
+    Divergence, Evaluation, IterationLimit, LossRule, MAX_ITERATIONS, Outcome, Progress, StopRule,
+    Termination, Verdict,
 };
 
 fn run_with(lines: &[Line], rule: Divergence) -> Outcome {
@@ -228,6 +228,14 @@ fn every_rule_of_a_tuple_is_called_and_the_first_to_end_decides() {
             }
         );
     }
+}
+
+#[test]
+fn without_rules_a_stage_ends_at_the_limit_of_the_engine() {
+    let lines = vec![(100, Some(1.0)); MAX_ITERATIONS + 1];
+    let outcome = run(&mut scripted(&lines, ()), &Isometry3::identity());
+    assert_eq!(outcome.termination, Termination::IterationLimit);
+    assert_eq!(outcome.iterations, MAX_ITERATIONS);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::system::normal_equations::NormalEquations;
 ///
 /// Point-to-plane with a little point-to-point (α ≈ 0.1) does not slide along planes. GenZ-ICP
 /// (Lee, Lim & Han 2024) is the sum of both with α and 1 − α. Terms are `(factor, metric)`: a tuple
-/// of up to three, or a `Vec` of any number of one type (such as boxed ones). Factors are not
+/// of up to eight, or a `Vec` of any number of one type (such as boxed ones). Factors are not
 /// negative, and terms of factor 0 are skipped.
 ///
 /// Terms contribute their [`Minimize::system`], so kernels and priors inside keep their effect.
@@ -30,11 +30,11 @@ pub struct WeightedSum<T> {
     pub terms: T,
 }
 
-/// The terms of a [`WeightedSum`]: one to three pairs `(factor, metric)` as a tuple, or a `Vec` of
+/// The terms of a [`WeightedSum`]: one to eight pairs `(factor, metric)` as a tuple, or a `Vec` of
 /// any number.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a list of terms",
-    note = "`WeightedSum::terms` accepts a tuple of one to three `(f64, M)` or a `Vec<(f64, M)>`, each `M` an error metric"
+    note = "`WeightedSum::terms` accepts a tuple of one to eight `(f64, M)` or a `Vec<(f64, M)>`, each `M` an error metric"
 )]
 pub trait Terms {
     /// Calls `visit` with every term of positive factor, in order, until it returns `None`.
@@ -74,6 +74,11 @@ macro_rules! terms {
 terms!(A);
 terms!(A, B);
 terms!(A, B, C);
+terms!(A, B, C, D);
+terms!(A, B, C, D, E);
+terms!(A, B, C, D, E, F);
+terms!(A, B, C, D, E, F, G);
+terms!(A, B, C, D, E, F, G, H);
 
 impl<T: Terms> Minimize for WeightedSum<T> {
     fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {

@@ -304,7 +304,12 @@ fn a_sum_is_the_sum_of_its_systems() {
     let mut numbers = Numbers(18);
     let pairs = messy(&mut numbers, 60);
     let mut sum = WeightedSum {
-        terms: ((0.7, PointToPlane), (0.3, Symmetric), (0.0, PointToPoint)),
+        terms: (
+            (0.7, PointToPlane),
+            (0.3, Symmetric),
+            (0.0, PointToPoint),
+            (0.0, PointToPoint),
+        ),
     };
     let whole = sum.system(&Iteration::default(), &pairs).unwrap();
     let plane = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
