@@ -43,7 +43,7 @@ impl NormalEquations {
     ///
     /// It is valid at the pose that minimizes the loss, for right pairs and independent residuals
     /// whose variances are inversely proportional to their weights. It does not contain wrong pairs
-    /// and common errors, so it is optimiztic for ICP (Censi 2007; Bonnabel, Barczyk & Goulette
+    /// and common errors, so it is optimistic for ICP (Censi 2007; Bonnabel, Barczyk & Goulette
     /// 2016). Neighboring pixels are correlated, and a robust kernel's weights reduce Σ w r².
     ///
     /// The measure of its accuracy is the mean of ξᵀΣ⁻¹ξ, which is 6 if Σ is right. Over 300 runs
