@@ -159,6 +159,7 @@ macro_rules! forward {
 forward!(
     Box<dyn Minimize + '_>,
     Box<dyn Minimize + Send + '_>,
+    Box<dyn Minimize + Send + Sync + '_>,
     &mut (dyn Minimize + '_),
     &mut (dyn Minimize + Send + '_)
 );

@@ -244,6 +244,8 @@ fn decorators_without_effect_forward_every_method() {
         || Box::new(PointToPoint) as Box<dyn ErrorMetric>,
     );
     check_metric_forwards(|| Symmetric, || Box::new(Symmetric) as Box<dyn ErrorMetric>);
+    let shared = || Box::new(PointToPoint) as Box<dyn Minimize + Send + Sync>;
+    check_metric_forwards(|| PointToPoint, shared);
     let boxed = || Box::new(Generalized::default()) as Box<dyn Minimize>;
     check_metric_forwards(
         || Robust::new(Generalized::default(), Kernel::WELSCH, Scale::default()),
