@@ -9,7 +9,14 @@ use crate::system::normal_equations::NormalEquations;
 ///
 /// A decorator (a kernel with a scale, a prior, a frozen direction) acts on the set of pairs and
 /// not on one of them. It returns the wrapped metric in [`Minimize::inner`] and overrides the
-/// methods that it changes; the others forward.
+/// methods that it changes. The others forward, except for [`Minimize::minimize`]: it solves the
+/// decorator's own [`Minimize::system`].
+///
+/// A decorator that does not change the system, for example because it counts or logs, must
+/// override `minimize`, too, and call that of the wrapped metric. Otherwise one Gauss–Newton step
+/// replaces its closed form or solver ([`PointToPoint`](crate::PointToPoint),
+/// [`LevenbergMarquardt`](crate::LevenbergMarquardt)). `hicp_testkit::check_metric_forwards` detects
+/// this.
 ///
 /// It is pure: equal iterations and pairs give equal results, and `&mut self` is scratch. A metric
 /// that depends on the pose reads it from [`Correspondences::camera_from_object`]. The index of the
@@ -61,7 +68,7 @@ pub trait Minimize {
     ///
     /// Returns `None` if the pairs do not determine a step: no pairs, only zero weights, fewer rows
     /// than unknowns, or numbers that are not finite. The provided method is one Gauss–Newton step:
-    /// it solves [`Minimize::system`].
+    /// it solves [`Minimize::system`]. It does not call [`Minimize::inner`].
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
         Some(Step {
             increment: self.system(iteration, pairs)?.solve()?,
