@@ -63,7 +63,7 @@ pub trait ErrorMetric {
     /// The provided method sums the squares of the pair's rows. Robust kernels and mean losses call
     /// it once per pair.
     fn squared_error(&self, pair: &Pair) -> f64 {
-        let mut system = NormalEquations::new(pair.source.point.cast(), 1.0);
+        let mut system = NormalEquations::of_loss(pair.source.point.cast());
         let unweighted = Pair {
             weight: 1.0,
             ..*pair

@@ -29,6 +29,8 @@ pub struct NormalEquations {
     pub(crate) freedom: Option<Freedom>,
     pub(crate) policy: Degeneracy,
     pub(crate) threshold: f64,
+    /// Rows add to the loss only.
+    loss_only: bool,
 }
 
 impl NormalEquations {
@@ -47,6 +49,15 @@ impl NormalEquations {
             freedom: None,
             policy: Degeneracy::default(),
             threshold: Degeneracy::THRESHOLD,
+            loss_only: false,
+        }
+    }
+
+    /// Creates an empty system in which rows add to the loss only, to the same bits.
+    pub(crate) fn of_loss(pivot: Point3<f64>) -> Self {
+        Self {
+            loss_only: true,
+            ..Self::new(pivot, 1.0)
         }
     }
 
@@ -87,6 +98,9 @@ impl NormalEquations {
         residual: f64,
         weight: f64,
     ) {
+        if self.loss_only {
+            return self.sums.add_loss(residual, weight);
+        }
         let lever = (point - self.pivot).cross(direction) * self.inverse_length;
         let jacobian = [
             direction.x,

@@ -45,6 +45,12 @@ impl RowSums {
         }
     }
 
+    /// Adds to rᵀWr as a row does.
+    #[inline(always)]
+    pub(crate) fn add_loss(&mut self, residual: f64, weight: f64) {
+        self.0[RESIDUAL][RESIDUAL] += weight * residual * residual;
+    }
+
     /// Adds to every sum.
     pub(crate) fn add(&mut self, hessian: &Matrix6<f64>, gradient: &Vector6<f64>, loss: f64) {
         for (column, sums) in self.0[..RESIDUAL].iter_mut().enumerate() {

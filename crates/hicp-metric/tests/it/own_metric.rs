@@ -42,6 +42,13 @@ fn squared_errors_sum_the_squares_of_unweighted_rows() {
         let depth = f64::from(pair.source.point.z) - f64::from(pair.target.point.z);
         let found = DepthDifference.squared_error(pair);
         assert!((found - depth * depth).abs() <= 1e-15 * found && found > 0.0);
+        let unweighted = Pair {
+            weight: 1.0,
+            ..*pair
+        };
+        let mut whole = NormalEquations::new(pair.source.point.cast(), 1.0);
+        PointToPoint.linearize(&unweighted, &mut whole);
+        assert_eq!(Rows(PointToPoint).squared_error(pair), whole.loss());
         let inner: [(Box<dyn ErrorMetric>, f64); 2] = [
             (
                 Box::new(Rows(PointToPoint)),
