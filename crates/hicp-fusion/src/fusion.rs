@@ -108,7 +108,8 @@ impl Fusion {
 
     /// Minimizes V from a start pose, `camera_from_object`.
     ///
-    /// Returns `None` without estimates, or if the start is not finite.
+    /// Returns a single estimate up to rounding, and `None` without estimates, or if the start is
+    /// not finite.
     #[must_use]
     pub fn solve(&self, start: &Isometry3<f64>) -> Option<Fused> {
         if !se3::is_finite(start) {
@@ -170,11 +171,13 @@ impl Fusion {
     }
 
     /// Returns the covariance of the fused pose for estimates with other covariances than their
-    /// weights.
+    /// weights, such as constant or robust ones.
     ///
-    /// It is A⁻¹ (Σ Gₖᵀ Wₖ Hₖ Cₖ Hₖᵀ Wₖ Gₖ) A⁻¹ with Hₖ = 𝓙(−ξₖ)⁻¹. `own` holds one matrix per
-    /// estimate, in the order of pushing.
-    pub(crate) fn covariance_from<'a>(
+    /// Push each pose with the covariance that weighs it, and solve. `fused` is that solution, and
+    /// `own` holds the covariance Cₖ of each estimate, in the order of pushing. The result is
+    /// A⁻¹ (Σ Gₖᵀ Wₖ Hₖ Cₖ Hₖᵀ Wₖ Gₖ) A⁻¹ with Wₖ = Σₖ⁻¹ and Hₖ = 𝓙(−ξₖ)⁻¹.
+    #[must_use]
+    pub fn covariance_from<'a>(
         &self,
         fused: &PoseEstimate,
         own: impl Iterator<Item = &'a Matrix6<f64>>,

@@ -224,6 +224,20 @@ fn a_single_estimate_is_returned_unchanged() {
 }
 
 #[test]
+fn the_covariance_of_a_mean_is_that_of_its_estimates() {
+    let (pose, certain) = (
+        Isometry3::translation(0.1, 0.0, 0.5),
+        Matrix6::identity() * 1e-6,
+    );
+    let own = [certain, certain * 3.0];
+    let fusion = fusion(&[estimate(pose, Matrix6::identity()); 2], EXACT);
+    let fused = fusion.solve(&pose).unwrap().estimate;
+    // The variance of a mean: (1 + 3)/4.
+    let found = fusion.covariance_from(&fused, own.iter());
+    assert!((found - certain).amax() < 1e-15);
+}
+
+#[test]
 fn one_wild_outlier_is_averaged_in_by_its_covariance() {
     let mut random = Random(6);
     let pose = random.pose(1.0);
