@@ -148,6 +148,15 @@ impl Correspondences {
     }
 }
 
+impl<'a> IntoIterator for &'a Correspondences {
+    type Item = &'a Pair;
+    type IntoIter = std::slice::Iter<'a, Pair>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.pairs.iter()
+    }
+}
+
 impl Extend<Pair> for Correspondences {
     fn extend<I: IntoIterator<Item = Pair>>(&mut self, pairs: I) {
         self.pairs.extend(pairs);

@@ -4,10 +4,8 @@
 
 use std::error::Error;
 
-use hybrid_icp::association::{DataAssociation, VisibleSurface};
-use hybrid_icp::core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
-use hybrid_icp::icp::{Divergence, Icp, IterationLimit, SmallMotion};
-use hybrid_icp::metric::PointToPlane;
+use hybrid_icp::core::RigidTransform;
+use hybrid_icp::prelude::*;
 
 mod scene;
 

@@ -4,11 +4,7 @@
 
 use std::error::Error;
 
-use hybrid_icp::association::{Projective, VisibleSurface};
-use hybrid_icp::core::Iteration;
-use hybrid_icp::icp::Judgment;
-use hybrid_icp::icp::{Icp, IterationLimit, Progress, StopRule, Termination};
-use hybrid_icp::metric::PointToPlane;
+use hybrid_icp::prelude::*;
 
 mod scene;
 

@@ -4,10 +4,7 @@
 
 use std::error::Error;
 
-use hybrid_icp::association::{MaxNormalAngle, NearestNeighbor, OutlierFilter, VisibleSurface};
-use hybrid_icp::core::{Correspondences, Iteration};
-use hybrid_icp::icp::{Icp, IterationLimit, SmallMotion};
-use hybrid_icp::metric::PointToPlane;
+use hybrid_icp::prelude::*;
 
 mod scene;
 

@@ -117,21 +117,22 @@ pub use trace::{StageRecord, Trace};
 pub use tracker::{TrackState, Tracked, Tracker, TrackerConfig};
 pub use warning::Warning;
 
-/// The names that most programs need: `use hybrid_icp::prelude::*;`.
+/// The names that most programs and most custom components need: `use hybrid_icp::prelude::*;`.
 ///
 /// Everything else is in the modules.
 pub mod prelude {
     pub use crate::{Preset, Refinement, Refiner, presets};
     pub use hicp_association::{
-        AllSamples, MaxDistance, MaxNormalAngle, NearestNeighbor, Projective, VisibleSurface,
+        AllSamples, DataAssociation, MaxDistance, MaxNormalAngle, NearestNeighbor, OutlierFilter,
+        Projective, VisibleSurface,
     };
     pub use hicp_core::{
-        DepthImage, Isometry3, Mask, Model, Observation, Pair, PinholeCamera, Point3, Problem,
-        TriMesh, Vector3,
+        Context, Correspondences, DepthImage, Isometry3, Iteration, Mask, Model, Observation, Pair,
+        PinholeCamera, Point3, Problem, Surfel, TriMesh, Vector3,
     };
     pub use hicp_icp::{
-        Cascade, Convergence, Divergence, Icp, IterationLimit, Outcome, Repeat, Session,
-        SmallMotion, Stage, Termination, Verdict,
+        Cascade, Convergence, Divergence, Icp, IterationLimit, Judgment, Outcome, Progress, Repeat,
+        Session, SmallMotion, Stage, StopRule, Termination, Verdict,
     };
     pub use hicp_metric::{
         ErrorMetric, Kernel, NormalEquations, PointToPlane, PointToPoint, Robust, Scale,

@@ -39,7 +39,7 @@ fn reserved_memory_is_used_and_kept() {
         pairs.push(pair(f32::from(i)));
     }
     assert_eq!((pairs.len(), pairs.as_slice().as_ptr()), (100, place));
-    let kept = pairs.as_slice().iter().map(|p| p.source.point.x);
+    let kept = (&pairs).into_iter().map(|p| p.source.point.x);
     assert!(kept.eq((0..100_u8).map(f32::from)));
     assert!(!pairs.is_empty());
     pairs.begin(&Isometry3::identity(), 0);
