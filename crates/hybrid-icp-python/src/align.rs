@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use hicp_io::{LengthUnit, PointCloud};
 use hybrid_icp::core::{Cloud, Isometry3, Point3, UnitVector3};
-use hybrid_icp::icp::{IterationEvent, Observer};
+use hybrid_icp::icp::{IterationEvent, Observer, Session, Workspace};
+use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::{CloudOptions, Registration};
 use pyo3::prelude::*;
 
@@ -81,8 +82,10 @@ pub(crate) fn align<'py>(
         let target = target.cloud(&options)?;
         let mut pipeline = method.build(max_distance);
         let mut signals = Signals(Ok(()));
-        let (init, observer) = (&init.isometry, &mut signals);
-        let found = hybrid_icp::align_observed(&source, &target, init, &mut pipeline, observer);
+        let mut workspace = Workspace::new(Rasterizer::default());
+        let mut session = Session::new(&mut workspace, &mut signals);
+        let init = &init.isometry;
+        let found = hybrid_icp::align_in(&source, &target, init, &mut pipeline, &mut session);
         signals.0.map(|()| found)
     })?;
     results::alignment(py, &alignment, &init)

@@ -12,8 +12,8 @@ use hicp_core::{
     Vector3,
 };
 use hicp_icp::{
-    BoxedStage, Cascade, Icp, IterationLimit, Observer, Outcome, Session, SmallMotion, Stage,
-    Termination, Workspace,
+    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, SmallMotion, Stage, Termination,
+    Workspace,
 };
 use hicp_metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
 use hicp_raster::Rasterizer;
@@ -326,6 +326,8 @@ impl Alignment {
 /// part of it needs an image or a mesh that is absent, the outcome keeps the initial pose and names
 /// the part. Never fails on data: without overlap, the outcome states that no pairs were found.
 ///
+/// A loop that registers many scans reuses its memory with [`align_in`].
+///
 /// For a depth image, use [`Refiner`](crate::Refiner): here the fitness of a model also counts the
 /// side that the camera cannot see, and a registration can end at a wrong pose without a warning.
 ///
@@ -352,21 +354,22 @@ pub fn align<'a>(
     init: &Isometry3<f64>,
     pipeline: &mut (impl Stage + ?Sized),
 ) -> Alignment {
-    align_observed(source, target, init, pipeline, &mut ())
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let mut observer = ();
+    let mut session = Session::new(&mut workspace, &mut observer);
+    align_in(source, target, init, pipeline, &mut session)
 }
 
-/// Registers two clouds as [`align`] does, and reports every step to an observer.
-pub fn align_observed<'a>(
+/// Registers two point clouds as [`align`] does, with a workspace to reuse and an observer.
+pub fn align_in<'a>(
     source: impl Into<Source<'a>>,
     target: impl Into<Target<'a>>,
     init: &Isometry3<f64>,
     pipeline: &mut (impl Stage + ?Sized),
-    observer: &mut dyn Observer,
+    session: &mut Session<'_>,
 ) -> Alignment {
     let (source, target) = (source.into(), target.into());
-    let mut workspace = Workspace::new(Rasterizer::default());
-    let mut session = Session::new(&mut workspace, observer);
-    let outcome = pipeline.run(&Problem::new(source, target), init, &mut session);
+    let outcome = pipeline.run(&Problem::new(source, target), init, session);
     let mut clouds = Vec::new();
     if let Source::Cloud(cloud) = source {
         clouds.push((CloudSide::Source, cloud));

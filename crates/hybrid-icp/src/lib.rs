@@ -97,8 +97,7 @@ pub use hicp_score as score;
 pub use hicp_switch as switch;
 
 pub use align::{
-    Alignment, CloudOptions, CloudSide, CloudWarning, NormalCount, Registration, align,
-    align_observed,
+    Alignment, CloudOptions, CloudSide, CloudWarning, NormalCount, Registration, align, align_in,
 };
 pub use batch::refine_batch;
 pub use calibration::Calibration;

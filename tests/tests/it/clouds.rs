@@ -8,10 +8,15 @@ use hybrid_icp::association::{
 use hybrid_icp::core::{
     Cloud, Isometry3, Model, Point3, Problem, Surfel, Vector3, sample_surface, se3,
 };
-use hybrid_icp::icp::{Guard, Icp, IterationLimit, SmallMotion, Stage, Termination};
+use hybrid_icp::icp::{
+    Guard, Icp, IterationLimit, Session, SmallMotion, Stage, Termination, Workspace,
+};
 use hybrid_icp::metric::PointToPlane;
+use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::MeanVsd;
-use hybrid_icp::{Alignment, CloudOptions, CloudSide, CloudWarning, Preset, Registration, align};
+use hybrid_icp::{
+    Alignment, CloudOptions, CloudSide, CloudWarning, Preset, Registration, Trace, align, align_in,
+};
 use proptest::prelude::*;
 use rand::RngExt;
 
@@ -76,6 +81,23 @@ proptest! {
             prop_assert!(angle.to_degrees() < 0.05 && distance < 1e-4, "{angle} {distance}");
         }
     }
+}
+
+#[test]
+fn a_reused_workspace_changes_nothing_and_the_observer_sees_every_stage() {
+    let target = cloud(&points(500));
+    let (mut workspace, mut trace) = (Workspace::new(Rasterizer::default()), Trace::new());
+    let mut pipeline = Registration::PointToPlane.build(None);
+    for count in [900, 400] {
+        let (source, init) = (
+            cloud(&points(count)),
+            pose([0.03, 0.0, 0.0], [0.002, 0.0, 0.0]),
+        );
+        let mut session = Session::new(&mut workspace, &mut trace);
+        let found = align_in(&source, &target, &init, &mut *pipeline, &mut session);
+        assert_eq!(found, align(&source, &target, &init, &mut *pipeline));
+    }
+    assert_eq!(trace.stages.len(), 4);
 }
 
 /// Every pose stays finite, and every result says what is wrong.
