@@ -13,7 +13,7 @@ use crate::terminal::warn;
 /// Name of the benchmark's file of targets.
 const TARGETS_FILE: &str = "test_targets_bop19.json";
 
-/// Reads the targets from `given`, or from the dataset's file.
+/// Reads the targets from `given`, or for a split of the test images from the dataset's file.
 ///
 /// Without both, every visible instance is a target.
 pub(crate) fn choose(
@@ -22,13 +22,17 @@ pub(crate) fn choose(
     given: Option<&Path>,
 ) -> anyhow::Result<Targets> {
     let of_dataset = dataset.root().join(TARGETS_FILE);
+    let is_test = split.starts_with("test");
     let path = match given {
         Some(path) => path,
-        None if !hicp_io::is_absent(&of_dataset) => &of_dataset,
+        None if is_test && !hicp_io::is_absent(&of_dataset) => &of_dataset,
         None => {
+            let why = match is_test {
+                true => format!("{} does not exist", of_dataset.display()),
+                false => format!("{TARGETS_FILE} is not about the split {split}"),
+            };
             warn(format_args!(
-                "{} does not exist: every instance of the split with a visible fraction of {MIN_VISIBLE_FRACTION} or more is a target",
-                of_dataset.display()
+                "{why}: every instance of the split with a visible fraction of {MIN_VISIBLE_FRACTION} or more is a target",
             ));
             return Ok(of_ground_truth(dataset, split)?);
         }

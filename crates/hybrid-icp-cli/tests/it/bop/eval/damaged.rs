@@ -101,6 +101,19 @@ fn without_targets_every_visible_instance_is_a_target() {
         .complains(&["warning: ", "test_targets_bop19.json does not exist"]);
     assert_eq!(read_json(&world)["targets"], json!(10));
 
+    // Those of the test images are not about another split, even if its numbers are the same.
+    let targets = r#"[{"scene_id": 3, "im_id": 0, "obj_id": 1, "inst_count": 1}]"#;
+    std::fs::write(world.path("test_targets_bop19.json"), targets).unwrap();
+    eval(&world, &[]).exits(0);
+    assert_eq!(read_json(&world)["targets"], json!(1));
+    std::fs::rename(world.path("test"), world.path("val")).unwrap();
+    eval(&world, &["--split", "val"])
+        .exits(0)
+        .complains(&["test_targets_bop19.json is not about the split val: every instance"]);
+    assert_eq!(read_json(&world)["targets"], json!(10));
+    std::fs::rename(world.path("val"), world.path("test")).unwrap();
+    std::fs::remove_file(world.path("test_targets_bop19.json")).unwrap();
+
     // Of two cars, only the more visible one is a target; the other is visible by less than a
     // tenth.
     let visible = |a: f64, b: f64| json!([{"visib_fract": a}, {"visib_fract": b}]);
