@@ -197,7 +197,7 @@ impl EvalJob {
         }
         if beyond > 0 {
             warnings.push(format!(
-                "{results}: {beyond} rows are ignored, because their target has fewer instances than rows; they have the lowest scores"
+                "{results}: {beyond} rows are ignored, because their target has fewer instances than rows; they have the lowest scores, or are the last of equal ones"
             ));
         }
         warnings

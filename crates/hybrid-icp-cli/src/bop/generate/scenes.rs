@@ -120,18 +120,20 @@ impl Generator<'_> {
             record
                 .truth
                 .push(ResultRow::new(scene_id, im_id, obj_id, truth));
-            for _ in 0..self.starts {
+            for start in 1..=self.starts {
                 let (low, width) = (PERTURBATION.start, PERTURBATION.end - PERTURBATION.start);
                 let mut factor = || low + width * starting.random::<f64>();
                 let translation = self.perturbation * MEAN_TRANSLATION_ERROR_METERS * factor();
                 let degrees = self.perturbation * MEAN_ROTATION_ERROR_DEGREES * factor();
                 let angle = degrees.to_radians();
                 let pose = perturb(&mut starting, &truth, translation, angle);
-                record
-                    .initial
-                    .push(ResultRow::new(scene_id, im_id, obj_id, pose));
+                let mut initial = ResultRow::new(scene_id, im_id, obj_id, pose);
+                initial.score = 1.0 / f64::from(start);
+                record.initial.push(initial);
             }
         }
+        // An evaluation takes the first pose of every instance, not all poses of one.
+        record.initial.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(record)
     }
 
