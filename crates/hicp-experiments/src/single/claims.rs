@@ -118,12 +118,16 @@ fn lowest_everywhere(judge: Judge<'_>, along: &str) -> Option<Claim> {
         ));
         rest.push(difference);
     }
+    let steps = first + rest.len();
+    if steps == 0 {
+        return None;
+    }
     let verdict = match ClaimVerdict::negative(&rest) {
         // Within the interval of the lowest, and no more than the tolerance above it.
         ClaimVerdict::Equivalent => ClaimVerdict::Holds,
         other => other,
     };
-    figures.insert(0, format!("lowest at {first} of {}", first + rest.len()));
+    figures.insert(0, format!("lowest at {first} of {steps}"));
     let text = "hybrid is the lowest, or within the interval of the lowest, at every step of";
     judge.claim(format!("{text} {along}"), verdict, listed(figures))
 }

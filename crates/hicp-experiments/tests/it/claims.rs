@@ -303,6 +303,14 @@ fn claims_are_about_the_variants_of_the_paper() {
             .iter()
             .any(|(text, _)| text.contains("lower mean VSD than each other"))
     );
+    // Without another variant of the paper, hybrid is not the lowest of anything.
+    study.rows.retain(|row| row.variant == "hybrid");
+    study
+        .config
+        .variants
+        .retain(|variant| variant.name == "hybrid");
+    let alone = judged(&study);
+    assert!(alone.is_empty(), "{alone:?}");
 }
 
 #[test]
