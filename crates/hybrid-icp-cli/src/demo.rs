@@ -139,6 +139,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "{time_ms:.1} ms from depth image to pose, on one core\n{}: the model's outline before (orange, dashed) and after (blue)",
         arguments.picture.display()
     ))?;
-    warnings::about_result(&refined).iter().for_each(warn);
+    warnings::about_result(&refined, "").iter().for_each(warn);
     Ok(())
 }

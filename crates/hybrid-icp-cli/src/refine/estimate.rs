@@ -68,11 +68,11 @@ fn bbox(text: &str) -> Result<Bbox, String> {
             && y.is_finite()
             && width.is_finite()
             && height.is_finite()
-            && *width > 0.0
-            && *height > 0.0
+            && *width >= 1.0
+            && *height >= 1.0
     })
     .ok_or_else(|| {
-        "expected x,y,width,height in pixels, with a width and height above 0".to_owned()
+        "expected x,y,width,height in pixels, with a width and height of 1 or more".to_owned()
     })
 }
 

@@ -229,7 +229,20 @@ impl Inputs {
                 warnings.extend(warning.map(|text| format!("{}: {text}", path.display())));
                 (Some(mask), [0.0; 4])
             }
-            Region::Box(bbox) => (None, *bbox),
+            Region::Box(bbox) => {
+                let [x, y, width, height] = *bbox;
+                let (w, h) = (f64::from(depth_size.0), f64::from(depth_size.1));
+                let inside = |start: f64, length: f64, side: f64| {
+                    start.round() < side && (start + length).round() > 0.0
+                };
+                if !inside(x, width, w) || !inside(y, height, h) {
+                    bail!(
+                        "--bbox {x},{y},{width},{height}: the box is outside of the {w}x{h} image {}, expected x,y,width,height in its pixels",
+                        files.depth.display()
+                    );
+                }
+                (None, *bbox)
+            }
         };
         let (size, sized) = match (&file_mask, &self.region) {
             (Some(mask), Region::Mask(path, _)) if depth_camera.is_some() => {

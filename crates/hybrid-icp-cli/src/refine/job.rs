@@ -92,7 +92,7 @@ impl JobOptions {
         let of_inputs = warnings::about_inputs(&model, &observation, &from, inputs, depth_scale)?;
         let mut warnings = of_files;
         warnings.extend(of_inputs);
-        warnings.extend(warnings::about_result(&refined));
+        warnings.extend(warnings::about_result(&refined, warnings::doctor(inputs)));
         let report = Report::new(
             &pipeline.name,
             init_file.as_ref(),

@@ -192,7 +192,8 @@ pub(crate) fn summary_of_estimate(found: &Refinement, reason: &str) -> String {
     let (outcome, mve) = (&found.outcome, found.mve);
     match outcome.verdict {
         Verdict::Refined => format!(
-            "estimated: MVE {mve:.3}, {} pairs, {} iterations; ended because {reason}",
+            "estimated: confidence {:.2}, MVE {mve:.3}, {} pairs, {} iterations; ended because {reason}",
+            found.confidence,
             outcome.n_pairs(),
             outcome.iterations,
         ),

@@ -5,13 +5,20 @@ use hybrid_icp::core::{Isometry3, Model, Observation};
 use hybrid_icp::icp::Verdict;
 use hybrid_icp::{Diagnosis, Fault, Refinement, Warning};
 
-use super::inputs::Inputs;
+use super::inputs::{Inputs, Region};
 
 /// The largest depth of a `DepthImage`.
 const MAX_DEPTH_METERS: f32 = 1000.0;
 
-/// The end of warnings about inputs that contradict each other.
-const DOCTOR: &str = "`hybrid-icp doctor` looks for the cause";
+/// Returns the end of warnings about inputs that contradict each other.
+///
+/// The doctor requires a mask, so the end is empty for a box.
+pub(super) fn doctor(inputs: &Inputs) -> &'static str {
+    match inputs.region {
+        Region::Mask(..) => "; `hybrid-icp doctor` looks for the cause",
+        Region::Box(_) => "",
+    }
+}
 
 /// Returns the reason for the outcome of a refinement.
 ///
@@ -62,19 +69,20 @@ pub(super) fn about_inputs(
         Some(path) => (path.display().to_string(), " and cam_t_m2c (mm)"),
         None => (String::new(), ""),
     };
+    let doctor = doctor(inputs);
     let in_words = |warning| match warning {
         Warning::Diameter { .. } => format!("{model}: {warning}, check --model-unit {unit}"),
-        Warning::BehindCamera { .. } => format!("{init}: {warning}: {DOCTOR}"),
+        Warning::BehindCamera { .. } => format!("{init}: {warning}{doctor}"),
         Warning::Center { .. } => format!("{}: {warning}", files.camera.display()),
         Warning::NoDepth => format!(
             "{depth}: {warning} at {depth_scale} mm per unit (depths beyond {MAX_DEPTH_METERS} m count as missing): \
              check --depth-scale and {mask}"
         ),
         Warning::Depth { .. } => format!(
-            "{depth}: {warning}: check --depth-scale (now {depth_scale} mm per unit){pose_unit}; {DOCTOR}"
+            "{depth}: {warning}: check --depth-scale (now {depth_scale} mm per unit){pose_unit}{doctor}"
         ),
         Warning::Mask { .. } | Warning::Sliver { .. } => {
-            format!("{mask}: {warning}: check --model-unit {unit}{pose_unit}; {DOCTOR}")
+            format!("{mask}: {warning}: check --model-unit {unit}{pose_unit}{doctor}")
         }
         _ => format!("{model}: {warning}"),
     };
@@ -91,9 +99,11 @@ pub(super) fn about_inputs(
 }
 
 /// Returns warnings about a refined pose that should not be trusted.
-pub(crate) fn about_result(refined: &Refinement) -> Vec<String> {
+///
+/// Those about a pose that explains nothing end with `doctor`.
+pub(crate) fn about_result(refined: &Refinement, doctor: &str) -> Vec<String> {
     let in_words = |warning: &Warning| match warning {
-        Warning::Unexplained { .. } => format!("{warning}; {DOCTOR}"),
+        Warning::Unexplained { .. } => format!("{warning}{doctor}"),
         _ => warning.to_string(),
     };
     refined.warnings().iter().map(in_words).collect()

@@ -3,7 +3,7 @@
 use crate::common::*;
 use crate::world::*;
 use hicp_io::bop::{ResultRow, Rle, read_results};
-use hicp_io::read_mask_png;
+use hicp_io::{LengthUnit, read_mask_png};
 use hicp_sim::Household;
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::score::ModelPoints;
@@ -32,7 +32,12 @@ fn an_object_is_found_in_its_mask_or_box() {
     let bbox = format!("--bbox {left},{top},{}.5,{}", shown.width(), shown.height());
     for region in ["--mask mask.png", &bbox] {
         let told = estimate(&scene, region).exits(0);
-        assert!(told.out.starts_with("estimated: MVE 0.0"), "{}", told.out);
+        assert!(
+            told.out.starts_with("estimated: confidence "),
+            "{}",
+            told.out
+        );
+        assert!(told.out.contains(", MVE 0.0"), "{}", told.out);
         assert_eq!(told.err, "");
         let result = result(&scene);
         assert!(error(CAR, &pose_of(&result), &truth()) < 0.001);
@@ -60,10 +65,27 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
         ("", &["--bbox"][..]),
         ("--mask mask.png --bbox 1,2,3,4", &["--bbox", "--mask"]),
         ("--bbox 1,2,3", &["--bbox", "x,y,width,height"]),
-        ("--bbox 1,2,3,-4", &["--bbox", "above 0"]),
-        ("--bbox 1,2,3,nan", &["--bbox", "above 0"]),
+        ("--bbox 1,2,3,-4", &["--bbox", "1 or more"]),
+        ("--bbox 1,2,3,nan", &["--bbox", "1 or more"]),
+        (
+            "--bbox 0.1,0.1,0.4,0.4",
+            &["--bbox", "in pixels", "1 or more"],
+        ),
     ] {
         estimate(&scene, region).exits(2).complains(parts);
+    }
+    // The doctor needs a mask and a pose, so it is no advice for a box.
+    hicp_io::write_ply(scene.path("mesh.ply"), &car(), LengthUnit::Centimeters).unwrap();
+    for (region, is_advised) in [("--mask mask.png", true), ("--bbox 60,30,200,180", false)] {
+        let told = estimate(&scene, region)
+            .exits(0)
+            .complains(&["--model-unit m"]);
+        assert_eq!(told.err.contains("doctor"), is_advised, "{}", told.err);
+    }
+    for bbox in ["320,0,9,9", "-9,0,9,9", "0,240,9,9"] {
+        estimate(&scene, &format!("--bbox {bbox}"))
+            .exits(1)
+            .complains(&[bbox, "outside of the 320x240 image depth.png"]);
     }
 }
 
