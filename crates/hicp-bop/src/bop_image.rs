@@ -182,11 +182,7 @@ impl<'a> BopImage<'a> {
     /// [`RowStatus::NoMask`] without both, [`RowStatus::Damaged`] if the mask has another size than
     /// the depth image.
     pub fn observe_detection(&mut self, detection: &Detection) -> Result<Observation, RowStatus> {
-        let source = match (&detection.segmentation, detection.bbox) {
-            (Some(code), _) => Source::Code(code),
-            (None, Some(bbox)) => Source::Box(bbox),
-            (None, None) => return Err(RowStatus::NoMask),
-        };
+        let source = Source::of(detection).ok_or(RowStatus::NoMask)?;
         let mask = source.read(&self.image);
         let observation = mask.and_then(|mask| {
             let observation = self.image.observe(mask);

@@ -1,6 +1,6 @@
 //! The storage of a mask: an image file, a run-length code or a box.
 
-use hicp_io::bop::Rle;
+use hicp_io::bop::{Detection, Rle};
 use hybrid_icp::core::Mask;
 use hybrid_icp::mask_in_box;
 
@@ -18,7 +18,13 @@ pub(crate) enum Source<'a> {
     Box([f64; 4]),
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
+    /// Returns the segmentation of a detection, or its box if it has none.
+    pub(crate) fn of(detection: &'a Detection) -> Option<Self> {
+        let code = detection.segmentation.as_ref().map(Self::Code);
+        code.or(detection.bbox.map(Self::Box))
+    }
+
     /// Reads the mask and checks that it has the size of the depth image.
     pub(crate) fn read(self, image: &Image) -> Result<Mask, Fault> {
         let Image { scene, im_id, .. } = image;

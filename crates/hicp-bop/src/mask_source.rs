@@ -18,7 +18,8 @@ pub enum MaskSource {
     /// The visible masks (`mask_visib`) of the ground truth.
     #[default]
     Visible,
-    /// The segmentations of detections, by image ([`MaskSource::detections`]).
+    /// The segmentations of detections, by image ([`MaskSource::detections`]). The mask of a
+    /// detection without one is in its box ([`hybrid_icp::mask_in_box`]).
     Detections(BTreeMap<FrameKey, Vec<Detection>>),
     /// No segmentation: the mask of a row consists of all measured points in a box around its pose.
     Box(BoxMask),
@@ -29,7 +30,7 @@ pub enum MaskSource {
 }
 
 impl MaskSource {
-    /// Creates a source from the segmentations of detections.
+    /// Creates a source from the segmentations and boxes of detections.
     #[must_use]
     pub fn detections(detections: Vec<Detection>) -> Self {
         Self::Detections(detections_by_frame(detections))
@@ -51,12 +52,8 @@ impl MaskSource {
                 None => faults.push(no_ground_truth(&image)),
             },
             Self::Detections(by_frame) => {
-                // Detections without a segmentation are ignored.
-                for detection in by_frame.get(&key).into_iter().flatten() {
-                    if let Some(code) = &detection.segmentation {
-                        masks.push((detection.category_id, Source::Code(code)));
-                    }
-                }
+                let detections = by_frame.get(&key).into_iter().flatten();
+                masks.extend(detections.filter_map(|d| Some((d.category_id, Source::of(d)?))));
             }
             Self::Box(_) | Self::OfRows(_) => {}
         }

@@ -44,7 +44,8 @@ pub(crate) struct Arguments {
     /// The result file to refine: CSV with scene_id, im_id, obj_id, score, R, t and time.
     #[arg(long, value_name = "IN.csv")]
     results: PathBuf,
-    /// Use the masks of a detections file (JSON with RLE segmentations) instead of mask_visib.
+    /// Use the masks of a detections file (JSON with RLE segmentations) instead of mask_visib. A
+    /// detection without a segmentation needs a bbox, as for `bop estimate`.
     #[arg(long, value_name = "FILE.json")]
     detections: Option<PathBuf>,
     /// The kind of mask.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::bail;
-use hicp_bop::{FrameResult, Models, RowResult, RowStatus};
+use hicp_bop::{FrameResult, MaskSource, Models, RowResult, RowStatus};
 use hybrid_icp::switch::PAPER_ALPHA;
 use hybrid_icp::{ACCEPTED, EXPLAINS_NOTHING, Warning};
 
@@ -128,7 +128,7 @@ pub(super) fn mean_seconds(results: &[FrameResult]) -> Option<f64> {
     (poses > 0).then(|| spent / poses as f64)
 }
 
-/// Warns of missing files. Fails if a file is damaged or no image was found.
+/// Warns of missing files. Fails if a file is damaged, or no image or no detection was found.
 pub(super) fn report_faults(
     job: &RefineJob<'_>,
     (models, models_dir): (&Models, &Path),
@@ -155,6 +155,16 @@ pub(super) fn report_faults(
             "{}: none of its frames is in {}, expected --dataset and --split to name the images of the rows",
             job.results.display(),
             job.dataset.root.join(&job.dataset.split).display()
+        );
+    }
+    let is_undetected = |row: &RowResult| row.status == RowStatus::NoMask;
+    if matches!(job.masks, MaskSource::Detections(_))
+        && !results.is_empty()
+        && rows_of(results).all(is_undetected)
+    {
+        bail!(
+            "{}: none of its rows has a detection, expected --detections with a segmentation or bbox of their scene_id, image_id and category_id",
+            job.results.display()
         );
     }
     Ok(())

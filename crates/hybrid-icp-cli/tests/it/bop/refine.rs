@@ -330,7 +330,7 @@ fn masks_of_a_detections_file_are_the_same_masks() {
                 }));
             }
         }
-        // A detection without a segmentation is ignored.
+        // A detection without a segmentation and a box is ignored.
         detections.push(json!({"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1}));
         std::fs::write(
             world.path("found.json"),
@@ -359,6 +359,29 @@ fn masks_of_a_detections_file_are_the_same_masks() {
             std::fs::rename(file.with_extension("aside"), file).unwrap();
         }
     }
+    // The box of a detection is used if it has no segmentation, and no detection is an error.
+    let mask = hicp_io::read_mask_png(world.mask_path(12, 40, 1)).unwrap();
+    let shown = mask.bounding_region();
+    let bbox = [
+        shown.u_min as usize,
+        shown.v_min as usize,
+        shown.width(),
+        shown.height(),
+    ];
+    let mut detections =
+        json!([{"scene_id": 12, "image_id": 40, "category_id": HAMMER, "score": 1, "bbox": bbox}]);
+    std::fs::write(world.path("found.json"), detections.to_string()).unwrap();
+    let told = world.run(&["--detections", "found.json"]).exits(0).out;
+    assert!(
+        told.contains("1  refined") && told.contains("9  kept: no mask"),
+        "{told}"
+    );
+    detections[0]["image_id"] = json!(41);
+    std::fs::write(world.path("found.json"), detections.to_string()).unwrap();
+    world
+        .run(&["--detections", "found.json"])
+        .exits(1)
+        .complains(&["in.csv: none of its rows has a detection", "image_id"]);
     std::fs::write(
         world.path("found.json"),
         r#"[{"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1, "segmentation": {"size": [240, 320], "counts": [7]}}]"#,
