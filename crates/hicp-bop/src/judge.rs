@@ -12,6 +12,7 @@ use hybrid_icp::score::{
 
 use crate::fault::{Fault, chain};
 use crate::frames::{FrameKey, frames_of};
+use crate::mask_source::no_ground_truth;
 use crate::models::Models;
 use crate::scenes::{Image, Scenes};
 
@@ -134,6 +135,11 @@ impl<'a> Judge<'a> {
                 return judged;
             }
         };
+        if image.scene.ground_truth(image.im_id).is_none() {
+            judged.left_out = wanted.values().map(|count| *count as usize).sum();
+            judged.faults.push(no_ground_truth(&image));
+            return judged;
+        }
         judged.misfits = wrong_sizes(&image);
         for (obj_id, count) in wanted {
             let count = *count as usize;

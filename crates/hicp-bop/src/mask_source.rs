@@ -62,7 +62,7 @@ impl MaskSource {
 }
 
 /// Returns the fault of an image without ground truth.
-fn no_ground_truth(image: &Image) -> Fault {
+pub(crate) fn no_ground_truth(image: &Image) -> Fault {
     let path = image.scene.dir().join("scene_gt.json");
     let why = match is_absent(&path) {
         true => "does not exist".to_owned(),

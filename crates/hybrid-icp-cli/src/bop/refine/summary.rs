@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::bail;
-use hicp_bop::{FrameResult, MaskSource, Models, RowResult, RowStatus};
+use hicp_bop::{Fault, FaultKind, FrameResult, MaskSource, Models, RowResult, RowStatus};
 use hybrid_icp::switch::PAPER_ALPHA;
 use hybrid_icp::{ACCEPTED, EXPLAINS_NOTHING, Warning};
 
@@ -142,7 +142,12 @@ pub(super) fn report_faults(
         warn(format_args!("{text}; its rows are {unused}"));
     }
     let faults = results.iter().flat_map(|result| &result.faults);
+    let is_of_mask = |fault: &Fault| fault.kind == FaultKind::MissingMask;
+    let lacks_masks = matches!(job.masks, MaskSource::Visible) && faults.clone().any(is_of_mask);
     let damaged = faults::report(faults, models.broken.values());
+    if lacks_masks {
+        warn("rows without a mask of the ground truth need --detections FILE or --mask none");
+    }
     if damaged > 0 {
         bail!(
             "{damaged} files could not be used; their rows are {unused} in {}",

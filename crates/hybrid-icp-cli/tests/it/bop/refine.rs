@@ -210,7 +210,8 @@ fn missing_ground_truth_is_reported_if_masks_depend_on_it() {
     // It is missing for both images, but reported once.
     assert_eq!(
         run.exits(0).err,
-        "warning: ground truth is missing: ./test/000003/scene_gt.json does not exist\n"
+        "warning: ground truth is missing: ./test/000003/scene_gt.json does not exist\n\
+         warning: rows without a mask of the ground truth need --detections FILE or --mask none\n"
     );
     // With masks from a file, it is not required.
     let (run, _) = world.refine(&rows, &["--mask", "none"]);

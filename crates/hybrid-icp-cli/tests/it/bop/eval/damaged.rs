@@ -220,6 +220,13 @@ fn damaged_files_are_reported_and_the_rest_is_evaluated() {
         "000003/depth/000000.png does not exist",
     ]);
     assert_eq!(read_json(&world)["left_out"], json!(2));
+    // A scene without ground truth is reported once.
+    let scene_gt = world.scene(3).join("scene_gt.json");
+    std::fs::rename(&scene_gt, world.path("aside.json")).unwrap();
+    let run = eval(&world, &[]).exits(0);
+    assert_eq!(run.err.matches("scene_gt.json").count(), 1, "{}", run.err);
+    assert!(run.err.contains("ground truth is missing"), "{}", run.err);
+    std::fs::rename(world.path("aside.json"), scene_gt).unwrap();
     // A depth image of the wrong size does not match its masks.
     std::fs::copy(small_path, &depth).unwrap();
     eval(&world, &[])
