@@ -9,6 +9,7 @@ use hybrid_icp::icp::{Alternative, Verdict};
 use hybrid_icp::{Refinement, Refiner, warnings};
 
 use crate::bop_image::BopImage;
+use crate::fault::Fault;
 use crate::frames::FrameKey;
 use crate::mask_source::MaskSource;
 use crate::models::Models;
@@ -66,8 +67,14 @@ impl DatasetRefiner {
         let mut result = FrameResult::default();
         let objects = indices.iter().map(|index| rows[*index].obj_id);
         if objects.into_iter().any(|obj_id| self.is_colored(obj_id)) {
-            // Without its color image, the rows are refined by depth alone.
-            result.faults.extend(image.read_color().err());
+            let unread = image.read_color().err();
+            result.faults.extend(unread.map(|fault| Fault {
+                text: format!(
+                    "{}; the rows of the image are refined by depth alone",
+                    fault.text
+                ),
+                ..fault
+            }));
         }
         let mut work = Work {
             frame: self.masks.frame(key, image),

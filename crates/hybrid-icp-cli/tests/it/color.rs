@@ -114,7 +114,8 @@ fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
     let (damaged, _) = world.refine(&rows, &["--models", "models_color"]);
     damaged
         .exits(1)
-        .complains(&["rgb/000040.png", "PNG or JPEG"]);
+        .complains(&["rgb/000040.png", "PNG or JPEG", "by depth alone"])
+        .complains(&["1 files could not be used; 0 rows are unchanged"]);
     let (_, refined) = world.refine(&rows, &["--models", "models_color", "--no-color"]);
     for (color, depth) in refined.iter().zip(&depth_only) {
         let (a, b) = (color.camera_from_object(), depth.camera_from_object());

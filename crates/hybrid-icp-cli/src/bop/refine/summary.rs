@@ -149,8 +149,10 @@ pub(super) fn report_faults(
         warn("rows without a mask of the ground truth need --detections FILE or --mask none");
     }
     if damaged > 0 {
+        let of_damaged = rows_of(results).filter(|row| row.status == RowStatus::Damaged);
         bail!(
-            "{damaged} files could not be used; their rows are {unused} in {}",
+            "{damaged} files could not be used; {} rows are {unused} in {}",
+            of_damaged.count(),
             job.output.display()
         );
     }
