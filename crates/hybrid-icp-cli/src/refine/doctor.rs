@@ -9,9 +9,10 @@ use hybrid_icp::{Diagnosis, Fault, Preset, Refiner};
 use serde_json::{Value, json};
 
 use super::inputs::{Inputs, Read, RefineFiles, Region};
+use super::warnings::about_inputs;
 use crate::limits::limits;
 use crate::outputs::Files;
-use crate::terminal::{check_stdout, say};
+use crate::terminal::{check_stdout, say, warn};
 
 /// Name what is wrong with the inputs of a refinement, and the fix.
 ///
@@ -102,8 +103,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         color,
         camera,
         init,
-        warnings,
-        ..
+        depth_scale,
+        mut warnings,
     } = read;
     let init = init.unwrap_or_else(|| unreachable!("--init is required"));
     let init = init.camera_from_object;
@@ -115,6 +116,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         observation = selected;
         faults.push(named);
     }
+    let of_inputs = about_inputs(&model, &observation, &init, &inputs, depth_scale, "")?;
+    warnings.extend(of_inputs);
     let diagnosis = Diagnosis::of(&model, &observation, &init);
     let mut found: Vec<(Fault, Option<f64>)> = diagnosis
         .findings
@@ -146,6 +149,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None if arguments.json => return say(json),
         None => {}
     }
+    warnings.iter().for_each(warn);
     say(text(&faults, diagnosis.score))
 }
 

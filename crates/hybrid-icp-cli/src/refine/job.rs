@@ -89,10 +89,18 @@ impl JobOptions {
             Some(_) => report::summary(&refined, &reason),
             None => report::summary_of_estimate(&refined, &reason),
         };
-        let of_inputs = warnings::about_inputs(&model, &observation, &from, inputs, depth_scale)?;
+        let doctor = warnings::doctor(inputs);
         let mut warnings = of_files;
-        warnings.extend(of_inputs);
-        warnings.extend(warnings::about_result(&refined, warnings::doctor(inputs)));
+        warnings.extend(warnings::about_inputs(
+            &model,
+            &observation,
+            &from,
+            inputs,
+            depth_scale,
+            doctor,
+        )?);
+        warnings.extend(warnings::about_facts(&model, &observation, inputs));
+        warnings.extend(warnings::about_result(&refined, doctor));
         let report = Report::new(
             &pipeline.name,
             init_file.as_ref(),

@@ -49,13 +49,15 @@ pub(crate) fn reason(
 
 /// Returns warnings about inputs that do not fit together, with the files and options to check.
 ///
-/// `pose` is the initial pose, or the estimated one if there is none.
+/// `pose` is the initial pose, or the estimated one if there is none. Warnings about contradictions
+/// end with `doctor`.
 pub(super) fn about_inputs(
     object: &Model,
     observation: &Observation,
     pose: &Isometry3<f64>,
     inputs: &Inputs,
     depth_scale: f64,
+    doctor: &str,
 ) -> anyhow::Result<Vec<String>> {
     let warnings = hybrid_icp::warnings(object, observation, pose).into_iter();
     // If nothing was found, there is no pose to warn of.
@@ -69,7 +71,6 @@ pub(super) fn about_inputs(
         Some(path) => (path.display().to_string(), " and cam_t_m2c (mm)"),
         None => (String::new(), ""),
     };
-    let doctor = doctor(inputs);
     let in_words = |warning| match warning {
         Warning::Diameter { .. } => format!("{model}: {warning}, check --model-unit {unit}"),
         Warning::BehindCamera { .. } => format!("{init}: {warning}{doctor}"),
@@ -86,16 +87,23 @@ pub(super) fn about_inputs(
         }
         _ => format!("{model}: {warning}"),
     };
-    let mut warnings: Vec<String> = warnings.map(in_words).collect();
-    // The other facts are among the warnings above.
-    for fault in Diagnosis::facts(object, observation) {
-        match fault {
-            Fault::MaskEmpty => warnings.push(format!("{mask}: {fault}: {}", fault.fix())),
-            Fault::MeshInsideOut => warnings.push(format!("{model}: {fault}: {}", fault.fix())),
-            _ => {}
-        }
-    }
-    Ok(warnings)
+    Ok(warnings.map(in_words).collect())
+}
+
+/// Returns warnings about facts of the inputs that [`about_inputs`] has not.
+pub(super) fn about_facts(
+    object: &Model,
+    observation: &Observation,
+    inputs: &Inputs,
+) -> Vec<String> {
+    let (model, mask) = (inputs.files.model.display(), inputs.mask_name());
+    let facts = Diagnosis::facts(object, observation).into_iter();
+    let in_words = |fault: Fault| match fault {
+        Fault::MaskEmpty => Some(format!("{mask}: {fault}: {}", fault.fix())),
+        Fault::MeshInsideOut => Some(format!("{model}: {fault}: {}", fault.fix())),
+        _ => None,
+    };
+    facts.filter_map(in_words).collect()
 }
 
 /// Returns warnings about a refined pose that should not be trusted.

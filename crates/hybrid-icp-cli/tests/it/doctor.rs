@@ -47,7 +47,10 @@ fn posed(change: impl Fn(Isometry3<f64>) -> Isometry3<f64>) -> Scene {
 #[test]
 fn clean_inputs_have_no_fault() {
     let (text, json) = examine(&Scene::new());
-    assert_eq!(json["faults"], json!([]));
+    assert_eq!(
+        (&json["faults"], &json["warnings"]),
+        (&json!([]), &json!([]))
+    );
     assert!(text.starts_with("no fault found (score 0."), "{text}");
 }
 
@@ -173,6 +176,17 @@ fn an_output_file_has_the_json() {
             .starts_with("fault: the mesh is 1000 times too small"),
         "{}",
         told.out
+    );
+    // The warnings of `refine` are there, too.
+    let first = json["warnings"][0].as_str().unwrap();
+    assert!(
+        first.contains("check --model-unit mm") && !first.contains("doctor"),
+        "{first}"
+    );
+    assert!(
+        told.err.contains(&format!("warning: {first}\n")),
+        "{}",
+        told.err
     );
     let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), json);
