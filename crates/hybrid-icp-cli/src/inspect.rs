@@ -3,19 +3,21 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hicp_io::LengthUnit;
-use hybrid_icp::core::{Facing, MeshSurvey, Model, TriMesh};
+use hicp_bop::chain;
+use hicp_io::{LengthUnit, MeshFile};
+use hybrid_icp::core::{Facing, MeshSurvey, Model, SurfaceColor};
 use serde::Serialize;
 
 use crate::limits::limits;
 use crate::terminal::say;
 
-/// Describe a mesh file: counts, size, whether it is closed, and warnings.
+/// Describe a mesh file: counts, size, whether it is closed, colors, and warnings.
 ///
 /// Polygons are counted as the triangles that they are cut into. With --json, the keys include
-/// triangles, vertices, diameter_m, closed, and warnings (a list of sentences, empty if nothing
-/// looks wrong). The exit code is 0 if the file can be read, with or without warnings. Otherwise it
-/// is 1, and a message names the place of the error.
+/// triangles, vertices, diameter_m, closed, color (vertices, textures or none, for --rgb of
+/// `refine`), and warnings (a list of sentences, empty if nothing looks wrong). The exit code is 0
+/// if the file can be read, with or without warnings. Otherwise it is 1, and a message names the
+/// place of the error.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -47,6 +49,8 @@ struct Report {
     diameter_m: f64,
     /// `true` if every edge has exactly two triangles.
     closed: bool,
+    /// `vertices`, `textures` or `none`.
+    color: &'static str,
     warnings: Vec<String>,
     bounding_box_m: [[f32; 3]; 2],
     area_m2: f64,
@@ -65,8 +69,8 @@ struct Report {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let mesh = limits().read_mesh(&arguments.file, arguments.unit)?;
-    let report = Report::of(arguments, mesh);
+    let file = limits().read_mesh_file(&arguments.file, arguments.unit)?;
+    let report = Report::of(arguments, file);
     if arguments.json {
         return say(serde_json::to_string_pretty(&report)?);
     }
@@ -74,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Report {
-    fn of(arguments: &Arguments, mesh: TriMesh) -> Self {
+    fn of(arguments: &Arguments, MeshFile { mesh, color_fault }: MeshFile) -> Self {
         let survey = mesh.survey();
         let (facing, step) = (mesh.facing(), mesh.coordinate_step());
         let model = Model::new(mesh);
@@ -94,6 +98,11 @@ impl Report {
             vertices: mesh.vertices().len(),
             diameter_m,
             closed: survey.is_watertight(),
+            color: match mesh.color() {
+                Some(SurfaceColor::Vertices(_)) => "vertices",
+                Some(_) => "textures",
+                None => "none",
+            },
             warnings: Vec::new(),
             bounding_box_m: bounds,
             area_m2: mesh.area(),
@@ -112,6 +121,8 @@ impl Report {
             suspected_unit: suspected.map(|unit| unit.to_string()),
         };
         report.warnings = report.warnings(&survey, step);
+        let unusable = color_fault.map(|fault| format!("colors cannot be used: {}", chain(&fault)));
+        report.warnings.extend(unusable);
         report
     }
 
@@ -168,10 +179,15 @@ impl Report {
             ..
         } = self;
         let closed = if self.closed { "closed" } else { "open" };
+        let color = match self.color {
+            "none" => "no colors",
+            "vertices" => "vertex colors",
+            textures => textures,
+        };
         let parts = if *components == 1 { "part" } else { "parts" };
         let [x, y, z] = [right - left, bottom - top, far - near];
         let mut text = format!(
-            "{file}: {triangles} triangles, {vertices} vertices, {components} {parts}, {closed}, facing {facing}\n  \
+            "{file}: {triangles} triangles, {vertices} vertices, {components} {parts}, {closed}, facing {facing}, {color}\n  \
              diameter {diameter_m:.6} m, box {x:.6} x {y:.6} x {z:.6} m from ({left}, {top}, {near}), area {area_m2:.6} m2"
         );
         for warning in &self.warnings {

@@ -47,6 +47,8 @@ fn a_color_image_is_used_with_a_colored_mesh_and_a_trace_repeats_it() {
         .with("--model", "colored.ply")
         .with("--trace", "trace.jsonl");
     scene.write("colored.ply", colored(&car(), 1.0));
+    let told = run(scene.folder.path(), ["inspect", "colored.ply"]).exits(0);
+    assert!(told.out.contains(", vertex colors\n"), "{}", told.out);
     write_gray(scene.path("rgb.png"), 320, 240);
     let result = scene.result();
     assert_improved(&pose_of(&result), &truth());

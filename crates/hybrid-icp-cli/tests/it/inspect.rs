@@ -44,8 +44,16 @@ fn a_clean_mesh() {
     let corners = serde_json::json!([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]);
     assert_eq!(cube["bounding_box_m"], corners);
     assert_eq!(cube["area_m2"], 6.0);
-    assert_eq!(cube["components"], 1);
+    assert_eq!(
+        (&cube["components"], &cube["color"]),
+        (&1.into(), &"none".into())
+    );
     warned(&cube, &[]);
+    let textured = "mtllib gone.mtl\nusemtl red\n".to_owned() + CUBE;
+    warned(
+        &inspected("cube.obj", textured, &[]),
+        &["colors cannot be used: "],
+    );
     let folder = tempfile::tempdir().unwrap();
     hicp_io::write_ply(
         folder.path().join("car.ply"),
