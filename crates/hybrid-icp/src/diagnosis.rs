@@ -55,6 +55,7 @@ pub struct Finding {
 /// Each of some 25 hypotheses corrects the inputs as if they had one fault. A short refinement then
 /// scores the corrected inputs, if their initial pose explains the image better than most others. A
 /// fault is named if its correction improves the score clearly, and to less than a half.
+/// Corrections that bend the surface must also fit better, such as that of distances along the ray.
 ///
 /// The score is the MVE of the refined pose, plus the mean distance in diameters by which the
 /// refinement moved the object's points. It is 1 if the numbers of the inputs exclude each other
@@ -112,7 +113,7 @@ impl Diagnosis {
             };
         }
         let mut judge = Judge::default();
-        let (score, flat) = judge.refined(&inputs);
+        let Judged { score, mve, flat } = judge.refined(&inputs);
         let mut trials = Vec::new();
         for (fault, inputs) in hypotheses::ALL.iter().flat_map(|of| of(&inputs)) {
             trials.push((judge.initial(&inputs), fault, inputs));
@@ -121,7 +122,17 @@ impl Diagnosis {
         let mut found = Vec::new();
         for (_, fault, inputs) in trials.into_iter().take(TRIALS) {
             let handicap = hypotheses::handicap(&fault);
-            let (corrected, _) = judge.refined(&inputs);
+            let trial = judge.refined(&inputs);
+            let corrected = trial.score;
+            // These bend the image. A rough pose may be nearer to a bent object, but the right
+            // object fits better after both are refined.
+            let is_bent = matches!(
+                fault,
+                Fault::RayDistance | Fault::DepthInverted | Fault::Disparity { .. }
+            );
+            if is_bent && trial.mve >= mve {
+                continue;
+            }
             let is_named = match fault {
                 // Pixels without a measurement have no effect on the score.
                 Fault::MaskTooLarge { outside } if outside > 0.5 => true,
@@ -169,6 +180,15 @@ impl Diagnosis {
     }
 }
 
+/// The result of a short refinement.
+struct Judged {
+    score: f64,
+    /// The MVE of the refined pose, however far it moved.
+    mve: f64,
+    /// Whether a plane explains the depth better than the model does.
+    flat: bool,
+}
+
 /// Scores inputs.
 struct Judge {
     stage: Local,
@@ -210,11 +230,15 @@ impl Judge {
         MeanVsd::default().score(&mut context, &inputs.init)
     }
 
-    /// Returns the score, and whether a plane explains the depth better than the model does.
-    fn refined(&mut self, inputs: &Inputs<'_>) -> (f64, bool) {
+    /// Refines the initial pose of inputs.
+    fn refined(&mut self, inputs: &Inputs<'_>) -> Judged {
         let (model, init) = (inputs.model.as_ref(), &inputs.init);
         let Some(observation) = Self::observation(inputs) else {
-            return (1.0, false);
+            return Judged {
+                score: 1.0,
+                mve: 1.0,
+                flat: false,
+            };
         };
         let problem = Problem::new(model, &observation);
         let (stage, observer) = (&mut self.stage, &mut ());
@@ -227,9 +251,12 @@ impl Judge {
         let moved: f64 = samples.map(|p| (refined * p - init * p).norm()).sum();
         let length = model.diameter().min(DISTANCE * (init * model.center()).z);
         let moved = moved / (model.samples().len().max(1) as f64 * length);
-        let score = mve(init).min(mve(&refined) + moved);
-        let flat = Flatness::at(&mut context, &refined).is_some_and(|flat| flat.is_flat());
-        (score, flat)
+        let (of_init, of_refined) = (mve(init), mve(&refined));
+        Judged {
+            score: of_init.min(of_refined + moved),
+            mve: of_refined,
+            flat: Flatness::at(&mut context, &refined).is_some_and(|flat| flat.is_flat()),
+        }
     }
 }
 

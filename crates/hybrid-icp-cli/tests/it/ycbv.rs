@@ -32,6 +32,37 @@ fn root() -> Option<PathBuf> {
     found
 }
 
+/// From a rough pose, a bent depth image may be nearer to the model, but it fits no better.
+#[test]
+fn a_rough_pose_is_no_fault_of_the_depth_image() {
+    let Some(root) = root() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write(
+        "camera.json",
+        r#"{"cam_K": [1066.778, 0, 312.9869, 0, 1067.487, 241.3109, 0, 0, 1], "depth_scale": 0.1}"#,
+    );
+    let pose = r#"{"cam_R_m2c": [0.672873, -0.739703, 0.00905, -0.302544, -0.286333, -0.90911,
+        0.675062, 0.608978, -0.416458], "cam_t_m2c": [-98.3928, 125.3708, 829.6257]}"#;
+    write("init.json", pose);
+    let scene = root.join("test/000050");
+    let files = [
+        ("--model", root.join("models/obj_000010.ply")),
+        ("--depth", scene.join("depth/000001.png")),
+        ("--mask", scene.join("mask_visib/000001_000003.png")),
+        ("--camera", "camera.json".into()),
+        ("--init", "init.json".into()),
+    ];
+    let mut words: Vec<&OsStr> = ["doctor", "--model-unit", "mm"].map(OsStr::new).to_vec();
+    words.extend(
+        files
+            .iter()
+            .flat_map(|(option, path)| [OsStr::new(*option), path.as_os_str()]),
+    );
+    let told = run(folder.path(), words).exits(0).out;
+    assert!(told.starts_with("no fault found"), "{told}");
+}
+
 #[test]
 fn real_estimates_of_four_methods_are_improved() {
     let Some(root) = root() else { return };
