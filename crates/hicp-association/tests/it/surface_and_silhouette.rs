@@ -411,7 +411,7 @@ fn joined_associations_add_up() {
         .collect();
     let candidates = first.n_candidates() + second.n_candidates();
     let members: Vec<Box<dyn DataAssociation>> = vec![Box::new(surface), Box::new(contour.clone())];
-    let (s, c) = (surface.clone(), contour.clone());
+    let (s, c) = (surface, contour.clone());
     let mut nested = (Vec::<Contour>::new(), (s,), c);
     for join in [
         &mut (surface, contour) as &mut dyn DataAssociation,
