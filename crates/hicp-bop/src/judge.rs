@@ -152,7 +152,7 @@ impl<'a> Judge<'a> {
             if n_truths < count {
                 judged.misfits.push(format!(
                     "{}, $.{}: {n_truths} instances of object {obj_id}, but the targets request {count}; the missing instances are left out",
-                    image.scene.dir().join("scene_gt.json").display(),
+                    image.scene.file("scene_gt").display(),
                     image.im_id,
                 ));
                 judged.left_out += count - n_truths;

@@ -63,7 +63,7 @@ impl MaskSource {
 
 /// Returns the fault of an image without ground truth.
 pub(crate) fn no_ground_truth(image: &Image) -> Fault {
-    let path = image.scene.dir().join("scene_gt.json");
+    let path = image.scene.file("scene_gt");
     let why = match is_absent(&path) {
         true => "does not exist".to_owned(),
         false => format!("does not have image {}", image.im_id),

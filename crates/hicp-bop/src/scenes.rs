@@ -134,7 +134,7 @@ impl Scenes {
         })?;
         let depth = scene.read_depth(im_id).map_err(|e| Fault::of(&e))?;
         let place = |key: &str| {
-            let file = scene.dir().join("scene_camera.json");
+            let file = scene.file("scene_camera");
             format!("{}, $.{im_id}.{key}", file.display())
         };
         let size = (depth.width(), depth.height());

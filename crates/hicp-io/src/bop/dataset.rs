@@ -34,6 +34,7 @@ pub struct Dataset {
     root: PathBuf,
     limits: ReadLimits,
     models: Option<PathBuf>,
+    sensor: Option<String>,
 }
 
 impl Dataset {
@@ -50,6 +51,7 @@ impl Dataset {
                 root,
                 limits,
                 models: None,
+                sensor: None,
             })
         } else {
             Err(IoError::missing(root, "dataset folder"))
@@ -78,6 +80,13 @@ impl Dataset {
         let missing = || IoError::missing(self.root.join(folder), "folder of models");
         self.models = Some(found.ok_or_else(missing)?);
         Ok(self)
+    }
+
+    /// Selects the sensor of scenes with several, such as `cam1` ([`Scene::open_within`]).
+    #[must_use]
+    pub fn with_sensor(mut self, sensor: Option<&str>) -> Self {
+        self.sensor = sensor.map(str::to_owned);
+        self
     }
 
     /// Returns the folder.
@@ -216,7 +225,7 @@ impl Dataset {
     /// exist, otherwise as for [`Scene::open`].
     pub fn scene(&self, split: &str, scene_id: u32) -> Result<Scene, IoError> {
         let folder = self.split_dir(split)?.join(format!("{scene_id:06}"));
-        Scene::open_within(self.limits, folder)
+        Scene::open_within(self.limits, folder, self.sensor.as_deref())
     }
 
     fn split_dir(&self, split: &str) -> Result<PathBuf, IoError> {

@@ -14,6 +14,8 @@ use crate::source::is_absent;
 #[derive(Clone, Debug)]
 pub struct Scene {
     dir: PathBuf,
+    /// The end of the names of the sensor's files and folders, such as `_cam1`; usually empty.
+    suffix: String,
     limits: ReadLimits,
     cameras: BTreeMap<u32, SceneCamera>,
     ground_truth: Option<BTreeMap<u32, Vec<GroundTruth>>>,
@@ -31,28 +33,54 @@ impl Scene {
     /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if the folder or its camera file does
     /// not exist, otherwise an [`IoError`] that names the JSON key of the fault.
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
-        Self::open_within(ReadLimits::DEFAULT, dir)
+        Self::open_within(ReadLimits::DEFAULT, dir, None)
     }
 
     /// Opens a scene as [`Scene::open`] does, and reads its JSON files and images within `limits`.
     ///
+    /// With `sensor`, its files and folders end with this name, such as `scene_gt_cam1.json` and
+    /// `depth_cam1`.
+    ///
     /// # Errors
     ///
     /// As for [`Scene::open`].
-    pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn open_within(
+        limits: ReadLimits,
+        dir: impl AsRef<Path>,
+        sensor: Option<&str>,
+    ) -> Result<Self, IoError> {
         let dir = dir.as_ref().to_owned();
         if is_absent(&dir) {
             return Err(IoError::missing(dir, "scene"));
         }
-        let cameras = dir.join("scene_camera.json");
+        let suffix = sensor.map_or(String::new(), |name| format!("_{name}"));
+        let path = |name: &str| dir.join(format!("{name}{suffix}.json"));
+        let missing = || match &sensors(&dir)[..] {
+            [] => IoError::missing(path("scene_camera"), "file of cameras"),
+            names => {
+                let what = format!("file of cameras (or --sensor {})", names.join(" or "));
+                IoError::missing(path("scene_camera"), &what)
+            }
+        };
         Ok(Self {
-            cameras: by_image(&limits, &cameras)?
-                .ok_or_else(|| IoError::missing(cameras, "file of cameras"))?,
-            ground_truth: by_image(&limits, &dir.join("scene_gt.json"))?,
-            info: by_image(&limits, &dir.join("scene_gt_info.json"))?,
+            cameras: by_image(&limits, &path("scene_camera"))?.ok_or_else(missing)?,
+            ground_truth: by_image(&limits, &path("scene_gt"))?,
+            info: by_image(&limits, &path("scene_gt_info"))?,
             dir,
+            suffix,
             limits,
         })
+    }
+
+    /// Returns the path of a JSON file of the scene, such as `scene_gt`. It may not exist.
+    #[must_use]
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.dir.join(format!("{name}{}.json", self.suffix))
+    }
+
+    /// Returns the path of an image in a folder of the scene, such as `depth`.
+    fn image(&self, folder: &str, name: &str) -> PathBuf {
+        self.dir.join(format!("{folder}{}/{name}", self.suffix))
     }
 
     /// Sets the limits for reading images, instead of [`ReadLimits::DEFAULT`].
@@ -86,8 +114,12 @@ impl Scene {
     }
 
     fn camera_error(&self, key: &str, found: &str, expected: &str) -> IoError {
-        let path = self.dir.join("scene_camera.json");
-        IoError::new(path, Place::Field(key.to_owned()), found, expected)
+        IoError::new(
+            self.file("scene_camera"),
+            Place::Field(key.to_owned()),
+            found,
+            expected,
+        )
     }
 
     /// Returns the pose of the world in the camera frame of an image, meters.
@@ -128,7 +160,7 @@ impl Scene {
     ///
     /// [`IoErrorKind::Missing`](crate::IoErrorKind::Missing) if there is no depth image.
     pub fn depth_path(&self, im_id: u32) -> Result<PathBuf, IoError> {
-        let png = self.dir.join(format!("depth/{im_id:06}.png"));
+        let png = self.image("depth", &format!("{im_id:06}.png"));
         let paths = ["png", "tif", "tiff"].map(|extension| png.with_extension(extension));
         let found = paths.into_iter().find(|path| !is_absent(path));
         found.ok_or_else(|| IoError::missing(png, "depth image"))
@@ -160,8 +192,8 @@ impl Scene {
     }
 
     fn picture_path(&self, folder: &str, im_id: u32) -> Option<PathBuf> {
-        let names = ["png", "jpg"].map(|ext| format!("{folder}/{im_id:06}.{ext}"));
-        let mut paths = names.iter().map(|name| self.dir.join(name));
+        let names = ["png", "jpg"].map(|ext| format!("{im_id:06}.{ext}"));
+        let mut paths = names.iter().map(|name| self.image(folder, name));
         paths.find(|path| !is_absent(path))
     }
 
@@ -180,8 +212,7 @@ impl Scene {
     /// `instance` counts from 0 in the order of the ground truth.
     #[must_use]
     pub fn visible_mask_path(&self, im_id: u32, instance: usize) -> PathBuf {
-        self.dir
-            .join(format!("mask_visib/{im_id:06}_{instance:06}.png"))
+        self.image("mask_visib", &format!("{im_id:06}_{instance:06}.png"))
     }
 
     /// Reads the mask of the visible part of an instance.
@@ -197,6 +228,19 @@ impl Scene {
         }
         self.limits.read_mask_png(path)
     }
+}
+
+/// Returns the sensors of a scene with several, as the ends of their files of cameras.
+fn sensors(dir: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let of_name = |name: String| {
+        let name = name.strip_prefix("scene_camera_")?;
+        name.strip_suffix(".json").map(str::to_owned)
+    };
+    let mut sensors: Vec<String> = names.filter_map(of_name).collect();
+    sensors.sort();
+    sensors
 }
 
 #[cfg(test)]

@@ -125,7 +125,7 @@ fn every_annotation_file_of_a_dataset_is_limited() {
     );
     let scene = folder.path().join("test/000001");
     above(
-        Scene::open_within(limits(10), &scene),
+        Scene::open_within(limits(10), &scene, None),
         "max_json_bytes",
         longest,
         10,

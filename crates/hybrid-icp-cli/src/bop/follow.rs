@@ -68,7 +68,7 @@ impl FollowOptions {
     /// Returns the ids of a scene's images in ascending order, from the first or from `--first`.
     pub(super) fn images(&self, scene: &Scene) -> anyhow::Result<Vec<u32>> {
         let first = self.first;
-        let file = scene.dir().join("scene_camera.json");
+        let file = scene.file("scene_camera");
         if let Some(first) = first
             && !scene.image_ids().any(|id| id == first)
         {

@@ -18,12 +18,16 @@ pub(crate) struct DatasetOptions {
     /// The split's folder: test, test_primesense, train_pbr, …
     #[arg(long, value_name = "NAME", default_value = "test")]
     pub(crate) split: String,
+    /// The sensor, if scenes have several: cam1 for scene_camera_cam1.json and depth_cam1/.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) sensor: Option<String>,
 }
 
 impl DatasetOptions {
     /// Opens the dataset with the limits of this run, and checks that it has the split.
     pub(crate) fn open(&self) -> Result<Dataset, IoError> {
         let dataset = Dataset::open(&self.root)?.with_limits(limits());
+        let dataset = dataset.with_sensor(self.sensor.as_deref());
         dataset.scene_ids(&self.split)?;
         Ok(dataset)
     }
@@ -32,7 +36,13 @@ impl DatasetOptions {
     pub(crate) fn has_color(&self) -> bool {
         let scenes = std::fs::read_dir(self.root.join(&self.split));
         let mut scenes = scenes.into_iter().flatten().flatten();
-        scenes.any(|scene| scene.path().join("rgb").is_dir())
+        scenes.any(|scene| scene.path().join(self.of_sensor("rgb")).is_dir())
+    }
+
+    /// Returns the name of a file or folder of the scenes, without its extension.
+    pub(crate) fn of_sensor(&self, name: &str) -> String {
+        let suffix = self.sensor.iter().map(|sensor| format!("_{sensor}"));
+        suffix.fold(name.to_owned(), |name, suffix| name + &suffix)
     }
 
     /// Returns the name of the dataset's folder.

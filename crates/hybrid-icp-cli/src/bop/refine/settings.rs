@@ -55,8 +55,10 @@ fn files(job: &RefineJob<'_>, rows: &[ResultRow], folder: &ModelFolder) -> Vec<S
     paths.extend(models.map(|id| Dataset::model_path_in(folder.dir(), *id)));
     let split = job.dataset.root.join(&job.dataset.split);
     for scene in scenes {
-        let names = ["scene_camera.json", "scene_gt.json", "scene_gt_info.json"];
-        paths.extend(names.map(|name| split.join(format!("{scene:06}")).join(name)));
+        let folder = split.join(format!("{scene:06}"));
+        let names = ["scene_camera", "scene_gt", "scene_gt_info"];
+        let names = names.map(|name| job.dataset.of_sensor(name) + ".json");
+        paths.extend(names.map(|name| folder.join(name)));
     }
     let named = |path: &Path| {
         let inside = path.strip_prefix(&job.dataset.root).unwrap_or(path);

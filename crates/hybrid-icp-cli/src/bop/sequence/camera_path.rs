@@ -11,7 +11,7 @@ pub(super) fn camera_path(
     scene: &Scene,
     images: &[u32],
 ) -> anyhow::Result<Vec<(u32, CameraMotion)>> {
-    let file = scene.dir().join("scene_camera.json");
+    let file = scene.file("scene_camera");
     let mut path = Vec::new();
     let mut before = None;
     for im_id in images.iter().copied() {

@@ -177,7 +177,7 @@ impl Arguments {
 
 /// Checks that the ground truth, which selects the masks, has the object in some image.
 fn check_object(scene: &Scene, path: &[(u32, CameraMotion)], object: u32) -> anyhow::Result<()> {
-    let file = scene.dir().join("scene_gt.json");
+    let file = scene.file("scene_gt");
     let truths = path
         .iter()
         .filter_map(|(im_id, _)| scene.ground_truth(*im_id));

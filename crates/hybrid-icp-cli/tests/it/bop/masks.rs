@@ -237,3 +237,29 @@ fn layouts_of_other_datasets_give_the_same_bytes() {
 fn run_words(world: &World, words: &str) -> Run {
     run(world.folder.path(), words.split(' '))
 }
+
+#[test]
+fn a_sensor_of_several_gives_the_same_bytes() {
+    let world = World::new();
+    let rows = world.rows();
+    let (run, _) = world.refine(&rows, &["--no-time"]);
+    run.exits(0);
+    let whole = std::fs::read(world.path("out.csv")).unwrap();
+    for scene in [3, 12] {
+        for name in names(&world.scene(scene)) {
+            let (stem, extension) = name
+                .split_once('.')
+                .map_or((&*name, ""), |(s, _)| (s, ".json"));
+            let to = world.scene(scene).join(format!("{stem}_cam1{extension}"));
+            std::fs::rename(world.scene(scene).join(&name), to).unwrap();
+        }
+    }
+    let (run, _) = world.refine(&rows, &["--no-time", "--sensor", "cam1"]);
+    assert_eq!(run.exits(0).err, "");
+    assert_eq!(std::fs::read(world.path("out.csv")).unwrap(), whole);
+    let (run, _) = world.refine(&rows, &[]);
+    run.exits(1).complains(&[
+        "scene_camera.json",
+        "file of cameras (or --sensor cam1) is missing",
+    ]);
+}
