@@ -174,7 +174,7 @@ def refine(
     if faults:
         raise InputError(
             f"{len(faults)} files could not be used, the first: {faults[0]}; "
-            f"their rows are unchanged in {output}"
+            f"all other rows are refined in {output}"
         )
     return statuses
 
