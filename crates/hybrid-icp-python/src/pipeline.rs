@@ -57,7 +57,7 @@ pub(crate) struct PyPipeline {
     file: PipelineFile,
     toml: String,
     overrides: Vec<String>,
-    /// Whether a part compares colors.
+    /// `true` if a part compares colors.
     colors: bool,
     /// Refiners that are not in use, with their scratch memory.
     refiners: Mutex<Vec<Refiner>>,

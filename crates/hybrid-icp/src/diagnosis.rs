@@ -185,7 +185,7 @@ struct Judged {
     score: f64,
     /// The MVE of the refined pose, however far it moved.
     mve: f64,
-    /// Whether a plane explains the depth better than the model does.
+    /// `true` if a plane explains the depth better than the model does.
     flat: bool,
 }
 
