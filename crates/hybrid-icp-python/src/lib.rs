@@ -30,6 +30,7 @@ mod score;
 mod sequence;
 mod step;
 mod toml;
+mod warnings;
 
 /// The native module that the package re-exports.
 #[pyo3::pymodule]

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::pipeline::PipelineFile;
-use hybrid_icp::{Preset, Refiner, Trace, Warning, warnings_of_image};
+use hybrid_icp::{Preset, Refiner, Trace};
 use pyo3::prelude::*;
 
 use crate::array::{self, Motion};
@@ -15,7 +15,7 @@ use crate::input::model::PyModel;
 use crate::input::observation::PyObservation;
 use crate::mutex::locked;
 use crate::observer::Watch;
-use crate::{results, toml};
+use crate::{results, toml, warnings};
 
 const EXPECTED_POSES: &str = "an (N, 4, 4) float64 array of [R t; 0 0 0 1], meters";
 
@@ -589,47 +589,7 @@ impl PyPipeline {
         distances: &[f64],
         compares_colors: bool,
     ) -> PyResult<()> {
-        let (model, image) = (&object.model, &observation.observation);
-        let missing = if model.mesh().color().is_none() {
-            Some("the model has no colors (Model.has_color)")
-        } else {
-            let colors = image.color().is_none();
-            colors.then_some("the observation has no color image (color=)")
-        };
-        if let Some(missing) = missing.filter(|_| compares_colors) {
-            let text = format!("{missing}, so that {} uses depth alone", self.__repr__());
-            errors::warn(py, &text)?;
-        }
-        if observation.pixels == 0 {
-            let text = "the mask is empty, expected pixels that are not 0 on the object";
-            errors::warn(py, text)?;
-        }
-        let (pixels, median) = (observation.pixels, observation.median_depth);
-        let at = |distance: &f64| warnings_of_image(model, image, *distance, pixels, median);
-        if distances.iter().any(|distance| at(distance).is_empty()) {
-            return Ok(());
-        }
-        let mut warnings = distances.first().into_iter().flat_map(at);
-        warnings.try_for_each(|warning| errors::warn(py, &in_words(warning)))
-    }
-}
-
-/// Returns a warning about inputs with the arguments to check.
-pub(crate) fn in_words(warning: Warning) -> String {
-    match warning {
-        Warning::BehindCamera { z } => format!(
-            "T_co puts the object's center at z = {z:.4} m, behind the camera, which looks along \
-             +z: expected camera from object, not object from camera"
-        ),
-        Warning::Depth { measured, expected } => format!(
-            "T_co puts the object's center at z = {expected:.4} m, but the median depth inside the \
-             mask is {measured:.4} m: check the units of both, expected meters"
-        ),
-        Warning::NoDepth => format!("{warning}: check scale= of the depth, and the mask"),
-        Warning::Mask { .. } | Warning::Sliver { .. } => format!(
-            "{warning}: check unit= of the model, that the pose is in meters, and that the mask \
-             shows the object"
-        ),
-        _ => warning.to_string(),
+        let by = compares_colors.then(|| self.__repr__());
+        warnings::about_inputs(py, object, observation, distances, by)
     }
 }

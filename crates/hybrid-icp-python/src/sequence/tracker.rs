@@ -12,7 +12,7 @@ use crate::input::camera::PyCamera;
 use crate::input::depth;
 use crate::input::model::PyModel;
 use crate::mutex::locked;
-use crate::pipeline::in_words;
+use crate::warnings::in_words;
 use crate::{errors, results};
 
 /// The longest time between two images, seconds. Longer ones are probably in other units.
