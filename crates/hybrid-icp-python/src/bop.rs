@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use hicp_bop::{
-    DatasetRefiner, FaultKind, MaskSource, ModelFolder, Models, Rescore, Scenes, frames_of,
+    BoxMask, DatasetRefiner, FaultKind, MaskSource, ModelFolder, Models, Rescore, Scenes, frames_of,
 };
+use hicp_io::ReadLimits;
 use hicp_io::bop::{Dataset, ResultRow, read_detections, read_results, results_from_csv};
 use hybrid_icp::Refiner;
 use pyo3::prelude::*;
@@ -83,6 +84,15 @@ pub(crate) fn result_header() -> String {
 ///     Ids of the objects whose models the constructor reads.
 /// detections : str or os.PathLike, optional
 ///     Use the masks of a detections file instead of mask_visib.
+/// mask : {"visible", "none"}, optional
+///     Without detections: mask_visib, or all measured points in a box around the pose of each row.
+/// models : str or os.PathLike, optional
+///     Another folder of meshes: one of the dataset, such as "models_color", or a path. Diameters
+///     and symmetries are still those of models/models_info.json.
+/// color : bool, optional
+///     Use the colors of the meshes and the images in rgb/ if both exist.
+/// sensor : str, optional
+///     The sensor of scenes with several, such as "cam1" for scene_camera_cam1.json and depth_cam1/.
 /// rescore : {"keep", "mve", "confidence"}, optional
 ///     The score of a refined row: its old score, 1 − MVE, or its
 ///     confidence.
@@ -96,7 +106,20 @@ pub(crate) struct PyDatasetRefiner {
 #[pymethods]
 impl PyDatasetRefiner {
     #[new]
-    #[pyo3(signature = (dataset, split, pipeline, objects, *, detections = None, rescore = "keep"))]
+    #[pyo3(signature = (
+        dataset,
+        split,
+        pipeline,
+        objects,
+        *,
+        detections = None,
+        mask = "visible",
+        models = None,
+        color = true,
+        sensor = None,
+        rescore = "keep"
+    ))]
+    #[allow(clippy::too_many_arguments)] // Options of Python.
     fn new(
         py: Python<'_>,
         dataset: PathBuf,
@@ -104,8 +127,17 @@ impl PyDatasetRefiner {
         pipeline: &Bound<'_, PyPipeline>,
         objects: Vec<u32>,
         detections: Option<PathBuf>,
+        mask: &str,
+        models: Option<PathBuf>,
+        color: bool,
+        sensor: Option<&str>,
         rescore: &str,
     ) -> PyResult<Self> {
+        let masks = [
+            ("visible", MaskSource::Visible),
+            ("none", MaskSource::Box(BoxMask::default())),
+        ];
+        let masks = array::choice("mask", mask, masks)?;
         let choices = [
             ("keep", Rescore::Keep),
             ("mve", Rescore::Mve),
@@ -115,15 +147,22 @@ impl PyDatasetRefiner {
         let refiner = Mutex::new(Refiner::boxed(pipeline.get().build()?));
         let shared = py
             .detach(|| -> Result<_, hicp_io::IoError> {
-                let dataset = Dataset::open(dataset)?;
+                let mut dataset = Dataset::open(dataset)?.with_sensor(sensor);
                 dataset.scene_ids(split)?;
-                let folder = ModelFolder::open(dataset.models_dir()?)?;
+                if let Some(models) = models {
+                    dataset = dataset.with_models(models)?;
+                }
+                let (dir, info) = (dataset.models_dir()?, dataset.models_info_path()?);
+                let mut folder = ModelFolder::with_info(ReadLimits::DEFAULT, dir, info)?;
+                if !color {
+                    folder = folder.without_color();
+                }
                 Ok(DatasetRefiner {
                     models: Models::read(&folder, &BTreeSet::from_iter(objects)),
                     scenes: Scenes::new(&dataset, split, OPEN_SCENES),
                     masks: match detections {
                         Some(path) => MaskSource::detections(read_detections(path)?),
-                        None => MaskSource::Visible,
+                        None => masks,
                     },
                 })
             })

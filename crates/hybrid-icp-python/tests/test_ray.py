@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -46,6 +47,32 @@ def test_images_one_by_one_have_the_bytes_of_the_program(dataset, tmp_path):
     assert (tmp_path / "out.csv").read_bytes() == expected
     with pytest.raises(hi.InputError, match="rows belong to 2 images, expected the rows of one"):
         refiner.refine(images[0][3] + images[1][3].removeprefix(bop.result_header()))
+
+
+def test_the_options_of_a_dataset_are_those_of_the_program(dataset, program, tmp_path):
+    folder, results, _ = dataset
+    # The meshes in another folder, and the files of scenes of a sensor.
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    shutil.copytree(copy / "models", copy / "models_color")
+    for scene in (copy / "test").iterdir():
+        for path in list(scene.iterdir()):
+            path.rename(path.with_name(f"{path.stem}_cam1{path.suffix}"))
+    images = bop.read_images(results)
+    options = {"mask": "none", "models": "models_color", "color": False, "sensor": "cam1"}
+    refiner = bop.DatasetRefiner(copy, "test", hi.Pipeline(), bop.object_ids(images), **options)
+    lines = {}
+    for _, _, indices, rows in images:
+        refined, _, faults = refiner.refine(rows)
+        assert not faults
+        lines.update(zip(indices, refined))
+    out = tmp_path / "out.csv"
+    words = ["bop", "refine", "--dataset", copy, "--results", results, "--output", out, "--no-time"]
+    words += ["--mask", "none", "--models", "models_color", "--no-color", "--sensor", "cam1"]
+    subprocess.run([program, *words], check=True, capture_output=True)
+    assert out.read_text().splitlines()[1:] == [lines[i] for i in sorted(lines)]
+    with pytest.raises(hi.InputError, match='mask is "box", expected "visible" or "none"'):
+        bop.DatasetRefiner(folder, "test", hi.Pipeline(), [1], mask="box")
 
 
 def test_a_killed_worker_changes_no_byte(dataset, ray, tmp_path):

@@ -1610,12 +1610,21 @@ class DatasetRefiner:
         Ids of the objects whose models the constructor reads.
     detections : str or os.PathLike, optional
         Use the masks of a detections file instead of mask_visib.
+    mask : {"visible", "none"}, optional
+        Without detections: mask_visib, or all measured points in a box around the pose of each row.
+    models : str or os.PathLike, optional
+        Another folder of meshes: one of the dataset, such as "models_color", or a path. Diameters
+        and symmetries are still those of models/models_info.json.
+    color : bool, optional
+        Use the colors of the meshes and the images in rgb/ if both exist.
+    sensor : str, optional
+        The sensor of scenes with several, such as "cam1" for scene_camera_cam1.json and depth_cam1/.
     rescore : {"keep", "mve", "confidence"}, optional
         The score of a refined row: its old score, 1 − MVE, or its
         confidence.
     """
 
-    def __new__(cls, dataset: _Path, split: str, pipeline: Pipeline, objects: Sequence[int], *, detections: _Path | None=None, rescore: Literal['keep', 'mve', 'confidence']='keep') -> DatasetRefiner:
+    def __new__(cls, dataset: _Path, split: str, pipeline: Pipeline, objects: Sequence[int], *, detections: _Path | None=None, mask: Literal['visible', 'none']='visible', models: _Path | None=None, color: bool=True, sensor: str | None=None, rescore: Literal['keep', 'mve', 'confidence']='keep') -> DatasetRefiner:
         ...
 
     def refine(self, rows: str) -> tuple[list[str], list[str], list[str]]:

@@ -60,6 +60,10 @@ def refine(
     split: str = "test",
     pipeline: Pipeline | None = None,
     detections: str | os.PathLike[str] | None = None,
+    mask: str = "visible",
+    models: str | os.PathLike[str] | None = None,
+    color: bool = True,
+    sensor: str | None = None,
     rescore: str = "keep",
     workers: int | None = None,
     num_cpus: float = 0.5,
@@ -88,6 +92,15 @@ def refine(
         The default is `Pipeline()`.
     detections : str or os.PathLike, optional
         Use the masks of a detections file instead of mask_visib.
+    mask : {"visible", "none"}, optional
+        Without detections: mask_visib, or all measured points in a box around the pose of each row.
+    models : str or os.PathLike, optional
+        Another folder of meshes: one of the dataset, such as "models_color", or a path that every
+        worker can read.
+    color : bool, optional
+        Use the colors of the meshes and the images in rgb/ if both exist.
+    sensor : str, optional
+        The sensor of scenes with several, such as "cam1".
     rescore : {"keep", "mve", "confidence"}, optional
         The score of a refined row: its old score, 1 - MVE, or its confidence.
     workers : int, optional
@@ -128,6 +141,10 @@ def refine(
         "pipeline": pipeline,
         "objects": bop.object_ids(images),
         "detections": None if detections is None else os.path.abspath(detections),
+        "mask": mask,
+        "models": None if models is None else os.fspath(models),
+        "color": color,
+        "sensor": sensor,
         "rescore": rescore,
     }
     settings = _digest(arguments, pipeline, tasks)
