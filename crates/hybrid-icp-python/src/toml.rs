@@ -15,7 +15,8 @@ pub(crate) fn value(value: &Bound<'_, PyAny>) -> PyResult<String> {
         Ok(number.repr()?.to_string())
     } else if let Ok(text) = value.cast::<PyString>() {
         let text = text.to_string();
-        Ok(format!("\"{}\"", text.escape_default()))
+        // The escapes of Rust are those of TOML, but for control characters other than \t, \n, \r.
+        Ok(format!("{text:?}"))
     } else if let Ok(dict) = value.cast::<PyDict>() {
         let entries = dict
             .iter()
