@@ -1,5 +1,6 @@
 //! A pose with its covariance, and the errors of invalid inputs.
 
+use hicp_core::internal::small::{cholesky6, eigen6};
 use hicp_core::{Isometry3, Matrix6, se3};
 use thiserror::Error;
 
@@ -230,8 +231,8 @@ pub(crate) fn checked_covariance(covariance: &Matrix6<f64>) -> Result<Matrix6<f6
     }
     let symmetric = symmetrized(covariance);
     let lifted = symmetric + Matrix6::identity() * (slack + f64::MIN_POSITIVE);
-    if lifted.cholesky().is_none() {
-        let eigenvalue = symmetric.symmetric_eigenvalues().min();
+    if cholesky6(&lifted).is_none() {
+        let eigenvalue = eigen6(&symmetric).map_or(f64::NAN, |eigen| eigen.eigenvalues.min());
         return Err(FusionError::CovarianceNegative { eigenvalue });
     }
     Ok(symmetric)

@@ -1,5 +1,6 @@
 //! Barfoot & Furgale's fusion of any number of pose estimates.
 
+use hicp_core::internal::small::{cholesky6, inverse_of, solve6};
 use hicp_core::{Isometry3, Matrix3, Matrix6, Vector3, Vector6, se3};
 
 use crate::estimate::{FusionError, PoseEstimate};
@@ -120,10 +121,10 @@ impl Fusion {
         let mut iterations = 1;
         let mut converged = false;
         while iterations < self.limits.max_iterations.max(1) {
-            let Some(factor) = at.hessian.cholesky() else {
+            let Some(factor) = cholesky6(&at.hessian) else {
                 break;
             };
-            let mut step = -factor.solve(&at.gradient);
+            let mut step = -solve6(&factor, &at.gradient);
             if !step.iter().all(|x| x.is_finite()) {
                 break;
             }
@@ -231,7 +232,7 @@ impl Fusion {
 
     /// Returns A⁻¹, or the covariance of the most certain estimate if rounding made A indefinite.
     fn covariance(&self, at: &Linearization) -> Option<Matrix6<f64>> {
-        let inverse = at.hessian.cholesky().map(|factor| factor.inverse());
+        let inverse = cholesky6(&at.hessian).map(|factor| inverse_of(&factor));
         if let Some(inverse) = inverse.filter(|inverse| inverse.iter().all(|x| x.is_finite())) {
             return Some(symmetrized(&inverse));
         }

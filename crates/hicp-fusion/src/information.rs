@@ -1,7 +1,8 @@
 //! Operations on 6×6 covariances: transport, inverse and determinant.
 
+use hicp_core::internal::small::{cholesky6, eigen6};
 use hicp_core::{Matrix6, Vector6};
-use nalgebra::{Cholesky, SymmetricEigen, U6};
+use nalgebra::{Cholesky, U6};
 
 /// Standard deviation, in meters and radians, for directions in which a singular covariance has
 /// none.
@@ -11,9 +12,6 @@ pub const MIN_STANDARD_DEVIATION: f64 = 1e-6;
 
 /// Share of its diagonal entry below which a pivot of the Cholesky decomposition is rounding.
 const RELATIVE_PIVOT: f64 = 1e-13;
-
-/// Largest number of eigenvalue iterations, more than any 6×6 matrix needs.
-const EIGEN_ITERATIONS: usize = 1000;
 
 /// Returns (Σ + Σᵀ)/2.
 pub(crate) fn symmetrized(matrix: &Matrix6<f64>) -> Matrix6<f64> {
@@ -51,7 +49,7 @@ pub(crate) fn log_determinant(covariance: &Matrix6<f64>) -> f64 {
 
 /// Returns the Cholesky decomposition of a covariance that is regular to working precision.
 fn regular_factor(covariance: &Matrix6<f64>) -> Option<Cholesky<f64, U6>> {
-    let factor = covariance.cholesky()?;
+    let factor = cholesky6(covariance)?;
     let l = factor.l_dirty();
     let regular = (0..6).all(|i| {
         let pivot = l[(i, i)] * l[(i, i)];
@@ -63,7 +61,7 @@ fn regular_factor(covariance: &Matrix6<f64>) -> Option<Cholesky<f64, U6>> {
 /// Returns the eigenvalues, raised to [`MIN_STANDARD_DEVIATION`]², and the eigenvectors.
 fn floored_eigen(covariance: &Matrix6<f64>) -> (Vector6<f64>, Matrix6<f64>) {
     let least = MIN_STANDARD_DEVIATION * MIN_STANDARD_DEVIATION;
-    match SymmetricEigen::try_new(*covariance, f64::EPSILON, EIGEN_ITERATIONS) {
+    match eigen6(covariance) {
         Some(eigen) => (eigen.eigenvalues.map(|v| v.max(least)), eigen.eigenvectors),
         None => (
             covariance.diagonal().map(|v| v.max(least)),

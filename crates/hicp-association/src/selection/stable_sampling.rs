@@ -1,5 +1,6 @@
 //! Subsets that keep the object from sliding.
 
+use hicp_core::internal::small::eigen6;
 use hicp_core::{Context, Isometry3, Matrix6, Point3, Problem, Surfel, Vector3, Vector6};
 
 use crate::scratch::Scratch;
@@ -140,7 +141,8 @@ impl Buffers {
             let v = constraint(surfel);
             sum + v * v.transpose()
         });
-        let motions = covariance.symmetric_eigen().eigenvectors;
+        let motions =
+            eigen6(&covariance).map_or_else(Matrix6::identity, |eigen| eigen.eigenvectors);
 
         self.contributions.clear();
         self.contributions

@@ -7,6 +7,7 @@ mod noise;
 pub(crate) mod number;
 mod plane;
 mod seen_colors;
+pub mod small;
 pub(crate) mod suggest;
 mod vectorized;
 mod whole;

@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::internal::small::inverse3;
+
 /// A plane in an image, in which inverse depth is linear: 1/z = a + b u + c v.
 #[derive(Clone, Copy, Debug)]
 pub struct DepthPlane(Vector3<f64>);
@@ -18,7 +20,7 @@ impl DepthPlane {
             normal += row * row.transpose();
             right += row / pixel.z;
         }
-        Some(Self(normal.try_inverse()? * right))
+        Some(Self(inverse3(&normal)? * right))
     }
 
     /// Iterates over planes through three of the pixels, which must not be empty.

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::internal::number::Number;
+use crate::internal::small::inverse3;
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 
@@ -53,7 +54,7 @@ pub fn rotation_from_matrix(matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>
     for _ in 0..4 {
         // Within the tolerance, the matrix is far from singular and the iteration converges
         // quadratically.
-        if let Some(inverse) = rotation.try_inverse() {
+        if let Some(inverse) = inverse3(&rotation) {
             rotation = (rotation + inverse.transpose()) * 0.5;
         }
     }

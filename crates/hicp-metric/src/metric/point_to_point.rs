@@ -1,10 +1,11 @@
 //! The point-to-point error metric.
 
+use hicp_core::internal::small::eigen3;
 use hicp_core::internal::{VectorLoop, vectorized};
 use hicp_core::{
     Correspondences, Isometry3, Matrix3, Pair, Point3, Translation3, UnitQuaternion, Vector3,
 };
-use nalgebra::{Matrix2, Quaternion, Rotation3, SymmetricEigen};
+use nalgebra::{Matrix2, Quaternion, Rotation3};
 
 use crate::metric::error_metric::{ErrorMetric, Step};
 use crate::system::normal_equations::NormalEquations;
@@ -178,7 +179,7 @@ fn nearest_rotation(covariance: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
         return None;
     }
     let h = covariance / scale;
-    let eigen = SymmetricEigen::new(h.transpose() * h);
+    let eigen = eigen3(&(h.transpose() * h))?;
     let v1 = eigen.eigenvectors.column(eigen.eigenvalues.imax());
     let v1 = v1.into_owned().normalize();
     let u1 = h * v1;

@@ -1,5 +1,6 @@
 //! Gradient, information and covariance of the pose that the pairs determine.
 
+use hicp_core::internal::small::{cholesky6, inverse_of};
 use hicp_core::{Correspondences, Matrix6, Vector6};
 
 use crate::metric::error_metric::ErrorMetric;
@@ -75,7 +76,8 @@ impl NormalEquations {
         // Inverted around the pivot, where it is well conditioned, and then moved to the camera
         // origin. The columns of frozen components are zero.
         let carried = self.camera_from_scaled() * basis;
-        let covariance = carried * reduced.cholesky()?.inverse() * carried.transpose() * variance;
+        let covariance =
+            carried * inverse_of(&cholesky6(&reduced)?) * carried.transpose() * variance;
         // Make it symmetric to the bit.
         let covariance = (covariance + covariance.transpose()) * 0.5;
         covariance
@@ -119,7 +121,7 @@ pub fn sandwich_covariance<M: ErrorMetric + ?Sized>(
     let spare = count.checked_sub(6).filter(|spare| *spare > 0)?;
     #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
     let correction = count as f64 / spare as f64;
-    let carried = system.camera_from_scaled() * hessian.cholesky()?.inverse();
+    let carried = system.camera_from_scaled() * inverse_of(&cholesky6(&hessian)?);
     let covariance = carried * middle * carried.transpose() * correction;
     let covariance = (covariance + covariance.transpose()) * 0.5;
     covariance

@@ -1,5 +1,6 @@
 //! Solutions of the normal equations.
 
+use hicp_core::internal::small::{cholesky6, eigen3, eigen6, solve6};
 use hicp_core::{Isometry3, Matrix3, Matrix6, Vector6, se3};
 use nalgebra::SymmetricEigen;
 
@@ -15,8 +16,6 @@ const DAMPING: f64 = 1e-6;
 const DIAGONAL_FLOOR: f64 = 1e-6;
 /// Share of the largest eigenvalue at which [`Degeneracy::FreezeRotations`] freezes a translation.
 const LEAST_SHIFT: f64 = 1e-4;
-/// Largest number of eigenvalue iterations: more than any 6×6 matrix needs.
-const EIGEN_ITERATIONS: usize = 1000;
 
 /// A step and its length.
 #[derive(Clone, Copy, Debug)]
@@ -98,10 +97,10 @@ impl NormalEquations {
         let hessian = self.scaled_hessian();
         let damped = hessian + Matrix6::identity() * (DAMPING * mean_diagonal);
         // Fails if the rows have no information or are not finite.
-        let factor = damped.cholesky()?;
+        let factor = cholesky6(&damped)?;
         let mut z = Vector6::zeros();
         for _ in 0..PASSES {
-            z -= factor.solve(&(self.scaled_gradient() + hessian * z));
+            z -= solve6(&factor, &(self.scaled_gradient() + hessian * z));
         }
         let mut rotation = z.fixed_rows_mut::<3>(3);
         rotation /= self.length;
@@ -114,11 +113,11 @@ impl NormalEquations {
         self.damp(&mut hessian, lambda);
         hessian += Matrix6::identity() * damping;
         if self.freedom.is_none() {
-            return Some(hessian.cholesky()?.solve(&-self.scaled_gradient()));
+            return Some(solve6(&cholesky6(&hessian)?, &-self.scaled_gradient()));
         }
         let (mut reduced, gradient) = self.reduced(&hessian);
         self.fill_held(&mut reduced);
-        let mut y = reduced.cholesky()?.solve(&-gradient);
+        let mut y = solve6(&cholesky6(&reduced)?, &-gradient);
         self.clear_held(&mut y);
         Some(y)
     }
@@ -219,12 +218,12 @@ pub(crate) fn eigen(matrix: Matrix6<f64>) -> Option<SymmetricEigen<f64, nalgebra
             eigenvalues: Vector6::zeros(),
         });
     }
-    SymmetricEigen::try_new(matrix, f64::EPSILON, EIGEN_ITERATIONS)
+    eigen6(&matrix)
 }
 
 /// Returns the inverse of a symmetric matrix in the directions whose eigenvalue is above a limit.
 fn inverse_above(matrix: Matrix3<f64>, limit: f64) -> Option<Matrix3<f64>> {
-    let mut eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, EIGEN_ITERATIONS)?;
+    let mut eigen = eigen3(&matrix)?;
     let inverse = |value: f64| if value > limit { 1.0 / value } else { 0.0 };
     eigen.eigenvalues = eigen.eigenvalues.map(inverse);
     Some(eigen.recompose())

@@ -1,5 +1,6 @@
 //! Sizes of displacements of an object.
 
+use hicp_core::internal::small::{eigen3, eigen6};
 use hicp_core::{Isometry3, Matrix3, Matrix6, Model, Point3, UnitVector3, Vector3};
 use hicp_score::mssd;
 
@@ -48,7 +49,7 @@ impl Extent {
     pub(super) fn deviation(&self, motion: &Motion) -> f64 {
         let scale = self.scale(motion.pose());
         let covariance = scale * motion.covariance() * scale.transpose();
-        covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
+        eigen6(&covariance).map_or(0.0, |eigen| eigen.eigenvalues.max().max(0.0).sqrt())
     }
 
     /// Returns the distance between two poses in the same sense, meters.
@@ -87,7 +88,7 @@ fn levers(model: &Model) -> Matrix3<f64> {
     let samples = model.samples().iter();
     let points: Vec<_> = samples.map(|s| s.point.cast::<f64>() - center).collect();
     let covariance: Matrix3<f64> = points.iter().map(|p| p * p.transpose()).sum();
-    let axes = covariance.symmetric_eigen().eigenvectors;
+    let axes = eigen3(&covariance).map_or_else(Matrix3::identity, |eigen| eigen.eigenvectors);
     let lever = |axis: usize| {
         let distances = points.iter().map(|p| axes.column(axis).cross(p).norm());
         distances.fold(0.0, f64::max)

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use hicp_core::internal::small::{eigen3, inverse3};
 use hicp_core::{
     DepthImage, ImageError, Isometry3, Mask, Matrix6, Observation, Problem, Translation3,
     UnitQuaternion, Vector3,
@@ -49,7 +50,8 @@ impl Matcher {
     ) -> Result<Option<Found>, ImageError> {
         let (model, camera) = (Arc::clone(&self.model), self.camera);
         let translation = motion.covariance().fixed_view::<3, 3>(0, 0).into_owned();
-        let deviation = translation.symmetric_eigenvalues().max().max(0.0).sqrt();
+        let deviation =
+            eigen3(&translation).map_or(0.0, |eigen| eigen.eigenvalues.max().max(0.0).sqrt());
         let sphere = Sphere {
             center: motion.center(),
             radius: 3.0 * deviation + model.radius(),
@@ -163,7 +165,7 @@ impl Matcher {
     pub(super) fn log_odds(&self, found: &Found, motion: &Motion) -> f64 {
         let covariance = motion.covariance().fixed_view::<3, 3>(0, 0).into_owned();
         let shift = found.pose * self.model.center() - motion.center();
-        let inverse = covariance.try_inverse().unwrap_or_default();
+        let inverse = inverse3(&covariance).unwrap_or_default();
         found.log_odds() - 0.5 * shift.dot(&(inverse * shift))
     }
 

@@ -1,5 +1,6 @@
 //! The motion of an object: a filter that predicts its pose and knows how uncertain it is.
 
+use hicp_core::internal::small::{eigen6, inverse6};
 use hicp_core::nalgebra::{Const, SymmetricEigen};
 use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, so3};
 
@@ -95,7 +96,7 @@ impl Motion {
 
     /// Combines the prediction with a measured pose of a covariance.
     pub(super) fn update(&mut self, measured: &Isometry3<f64>, covariance: &Matrix6<f64>) {
-        let Some(inverse) = (self.of_pose + covariance).try_inverse() else {
+        let Some(inverse) = inverse6(&(self.of_pose + covariance)) else {
             return;
         };
         let difference = difference(measured, &self.pose, &self.center);
@@ -138,10 +139,14 @@ impl Registered {
         let mut change = Matrix6::identity();
         let arm: Matrix3<f64> = so3::hat(&center.coords);
         change.fixed_view_mut::<3, 3>(0, 3).copy_from(&arm);
-        let unit = displacement.try_inverse().unwrap_or_else(Matrix6::identity);
+        let unit = inverse6(displacement).unwrap_or_else(Matrix6::identity);
         let change = change * unit;
+        let none = SymmetricEigen {
+            eigenvectors: Matrix6::identity(),
+            eigenvalues: Vector6::zeros(),
+        };
         Self {
-            eigen: (change.transpose() * information * change).symmetric_eigen(),
+            eigen: eigen6(&(change.transpose() * information * change)).unwrap_or(none),
             displacement: *displacement,
             unit,
         }
@@ -169,7 +174,7 @@ impl Registered {
         let information = self.eigen.recompose() / scale;
         let information = self.displacement.transpose() * information * self.displacement + prior;
         let floor = Matrix6::from_diagonal(&squares(floor));
-        let covariance = information.try_inverse();
+        let covariance = inverse6(&information);
         covariance.unwrap_or_else(|| Matrix6::from_diagonal(&squares(unknown))) + floor
     }
 }

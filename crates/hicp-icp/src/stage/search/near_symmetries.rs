@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use hicp_core::internal::small::eigen3;
 use hicp_core::internal::{VectorLoop, vectorized};
 use hicp_core::{
     Isometry3, Matrix3, Model, Observation, Point3, Surfel, TriMesh, UnitQuaternion, UnitVector3,
@@ -197,7 +198,7 @@ fn principal_axes(mesh: &TriMesh) -> Matrix3<f64> {
     }
     let mean = first / area;
     let covariance = second / area - mean * mean.transpose();
-    covariance.symmetric_eigen().eigenvectors
+    eigen3(&covariance).map_or_else(Matrix3::identity, |eigen| eigen.eigenvectors)
 }
 
 /// Rotates the axes such that the nearest one is a given axis, if it is tilted a little.

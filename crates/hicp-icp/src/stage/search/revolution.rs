@@ -1,5 +1,6 @@
 //! The axis of the part of an object that is a surface of revolution.
 
+use hicp_core::internal::small::{eigen3, inverse3};
 use hicp_core::{Matrix3, Surfel, UnitVector3, Vector3};
 
 /// Number of fits, each to the samples that agree with the last one.
@@ -44,8 +45,8 @@ pub(crate) fn axis_of(samples: &[Surfel], diameter: f64) -> Option<UnitVector3<f
             shifts += normal * normal.transpose();
         }
         // The best velocity of the origin for each rotation is eliminated.
-        let velocity = -shifts.try_inverse()? * mixed.transpose();
-        let eigen = (turns + mixed * velocity).symmetric_eigen();
+        let velocity = -inverse3(&shifts)? * mixed.transpose();
+        let eigen = eigen3(&(turns + mixed * velocity))?;
         axis = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
         let velocity = velocity * axis;
         for (deviation, (moment, normal)) in deviations.iter_mut().zip(&lines) {
