@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use hicp_core::Isometry3;
+use hicp_core::internal::for_tuples;
 
 use crate::outcome::{Evaluation, Outcome};
 
@@ -83,14 +84,7 @@ macro_rules! all {
         }
     };
 }
-all!(A);
-all!(A, B);
-all!(A, B, C);
-all!(A, B, C, D);
-all!(A, B, C, D, E);
-all!(A, B, C, D, E, F);
-all!(A, B, C, D, E, F, G);
-all!(A, B, C, D, E, F, G, H);
+for_tuples!(all);
 
 /// An evaluated pose.
 #[derive(Clone, Copy, Debug)]

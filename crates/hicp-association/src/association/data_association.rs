@@ -1,6 +1,6 @@
 //! The trait of data associations.
 
-use hicp_core::internal::type_label;
+use hicp_core::internal::{for_tuples, type_label};
 use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
 
 /// Pairs model points with observed points: Algorithm 1, line 1 (and the transform of line 2).
@@ -172,11 +172,4 @@ macro_rules! joined {
         }
     };
 }
-joined!(A);
-joined!(A, B);
-joined!(A, B, C);
-joined!(A, B, C, D);
-joined!(A, B, C, D, E);
-joined!(A, B, C, D, E, F);
-joined!(A, B, C, D, E, F, G);
-joined!(A, B, C, D, E, F, G, H);
+for_tuples!(joined);

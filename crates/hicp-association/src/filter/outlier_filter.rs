@@ -1,6 +1,6 @@
 //! The trait of outlier filters, and their chains.
 
-use hicp_core::internal::type_label;
+use hicp_core::internal::{for_tuples, type_label};
 use hicp_core::{Correspondences, Iteration, Problem};
 
 /// Removes or re-weights pairs (the third and fourth ICP components, §II).
@@ -142,11 +142,4 @@ macro_rules! chain {
         }
     };
 }
-chain!(A);
-chain!(A, B);
-chain!(A, B, C);
-chain!(A, B, C, D);
-chain!(A, B, C, D, E);
-chain!(A, B, C, D, E, F);
-chain!(A, B, C, D, E, F, G);
-chain!(A, B, C, D, E, F, G, H);
+for_tuples!(chain);

@@ -9,6 +9,7 @@ mod plane;
 mod seen_colors;
 pub mod small;
 pub(crate) mod suggest;
+mod tuples;
 mod vectorized;
 mod whole;
 mod work;
@@ -23,4 +24,5 @@ pub use vectorized::{VectorLoop, stored, vectorized};
 pub use whole::whole;
 pub use work::Work;
 
+pub use crate::for_tuples;
 pub use crate::object::mesh::coordinate_step;

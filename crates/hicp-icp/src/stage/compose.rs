@@ -1,5 +1,6 @@
 //! Stages made of stages.
 
+use hicp_core::internal::for_tuples;
 use hicp_core::{Isometry3, Problem};
 
 use crate::outcome::{Outcome, Verdict};
@@ -45,14 +46,7 @@ macro_rules! cascade {
         }
     };
 }
-cascade!(A);
-cascade!(A, B);
-cascade!(A, B, C);
-cascade!(A, B, C, D);
-cascade!(A, B, C, D, E);
-cascade!(A, B, C, D, E, F);
-cascade!(A, B, C, D, E, F, G);
-cascade!(A, B, C, D, E, F, G, H);
+for_tuples!(cascade);
 
 /// A cascade without stages keeps the initial pose as converged, for a branch of a switch.
 impl Stage for Cascade<()> {

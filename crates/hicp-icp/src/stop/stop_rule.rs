@@ -1,6 +1,6 @@
 //! The trait of stop rules, and their combination.
 
-use hicp_core::internal::type_label;
+use hicp_core::internal::{for_tuples, type_label};
 use hicp_core::{Isometry3, Iteration};
 
 use crate::outcome::{Evaluation, Termination};
@@ -180,11 +180,4 @@ macro_rules! any_of {
         }
     };
 }
-any_of!(A);
-any_of!(A, B);
-any_of!(A, B, C);
-any_of!(A, B, C, D);
-any_of!(A, B, C, D, E);
-any_of!(A, B, C, D, E, F);
-any_of!(A, B, C, D, E, F, G);
-any_of!(A, B, C, D, E, F, G, H);
+for_tuples!(any_of);

@@ -1,5 +1,6 @@
 //! Several metrics in one normal system.
 
+use hicp_core::internal::for_tuples;
 use hicp_core::{Correspondences, Iteration};
 
 use crate::metric::minimize::Minimize;
@@ -71,14 +72,7 @@ macro_rules! terms {
         }
     };
 }
-terms!(A);
-terms!(A, B);
-terms!(A, B, C);
-terms!(A, B, C, D);
-terms!(A, B, C, D, E);
-terms!(A, B, C, D, E, F);
-terms!(A, B, C, D, E, F, G);
-terms!(A, B, C, D, E, F, G, H);
+for_tuples!(terms);
 
 impl<T: Terms> Minimize for WeightedSum<T> {
     fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
