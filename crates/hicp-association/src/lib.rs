@@ -52,7 +52,6 @@ mod boundary;
 mod cloud;
 mod filter;
 mod length;
-mod scratch;
 mod search;
 mod selection;
 mod stride;

@@ -1,10 +1,9 @@
 //! Nearest-neighbor data association.
 
-use hicp_core::internal::{VectorLoop, vectorized};
+use hicp_core::internal::{Scratch, VectorLoop, vectorized};
 use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel, Target};
 
 use crate::association::data_association::DataAssociation;
-use crate::scratch::Scratch;
 use crate::search::box_tree::Stack;
 #[cfg(feature = "kiddo")]
 use crate::search::kd_tree::KdTree;

@@ -1,10 +1,10 @@
 //! Nearest neighbors with a similar orientation.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
 
 use crate::association::data_association::DataAssociation;
 use crate::filter::max_normal_angle::min_cosine;
-use crate::scratch::Scratch;
 use crate::search::box_tree::Stack;
 use crate::search::nearest::Nearest;
 use crate::search::observed_points::ObservedPoints;

@@ -1,10 +1,10 @@
 //! Association along the normal.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Context, Correspondences, Isometry3, Pair, RigidTransform, Surfel};
 
 use crate::association::data_association::DataAssociation;
 use crate::length::Length;
-use crate::scratch::Scratch;
 use crate::search::box_tree::Stack;
 use crate::search::nearest::Nearest;
 use crate::search::observed_points::ObservedPoints;

@@ -1,9 +1,9 @@
 //! Mutual nearest neighbors.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Context, Correspondences, Isometry3, Point3, Problem, RigidTransform, Surfel};
 
 use crate::association::data_association::DataAssociation;
-use crate::scratch::Scratch;
 use crate::search::box_tree::Stack;
 use crate::search::nearest::distance_squared;
 use crate::search::point_tree::PointTree;

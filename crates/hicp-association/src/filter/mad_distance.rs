@@ -1,11 +1,11 @@
 //! Rejection by the median absolute deviation.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::distances::{collect_finite, median};
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
-use crate::scratch::Scratch;
 
 /// σ of a normal distribution, divided by its median absolute deviation.
 const SIGMA_PER_MAD: f32 = 1.4826;

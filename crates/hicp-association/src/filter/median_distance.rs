@@ -1,11 +1,11 @@
 //! Rejection by a multiple of the median distance.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::distances::{collect_finite, median};
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
-use crate::scratch::Scratch;
 
 /// Removes pairs further apart than `factor` times the median distance.
 ///

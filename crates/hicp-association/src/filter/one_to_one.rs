@@ -1,9 +1,9 @@
 //! One pair per observed point.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Iteration, Pair};
 
 use crate::filter::outlier_filter::OutlierFilter;
-use crate::scratch::Scratch;
 
 /// Keeps for every observed point the pair with the closest model point.
 ///

@@ -1,11 +1,11 @@
 //! Rejection of a fixed share.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::distances::{collect_finite, nth_smallest, share_of};
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
-use crate::scratch::Scratch;
 
 /// Keeps the closest share of the pairs (trimmed ICP, Chetverikov, Stepanov & Krsek 2005).
 ///

@@ -1,8 +1,8 @@
 //! Subsets with evenly distributed normals.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Context, Isometry3, Problem, Surfel, UnitVector3};
 
-use crate::scratch::Scratch;
 use crate::selection::all_samples::AllSamples;
 use crate::selection::keep::spread;
 use crate::selection::point_selection::PointSelection;

@@ -1,9 +1,9 @@
 //! Subsets that keep the object from sliding.
 
+use hicp_core::internal::Scratch;
 use hicp_core::internal::small::eigen6;
 use hicp_core::{Context, Isometry3, Matrix6, Point3, Problem, Surfel, Vector3, Vector6};
 
-use crate::scratch::Scratch;
 use crate::selection::all_samples::AllSamples;
 use crate::selection::keep::keep_positions;
 use crate::selection::point_selection::PointSelection;

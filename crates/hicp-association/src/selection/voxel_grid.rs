@@ -1,9 +1,9 @@
 //! One point per cell of a grid.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Context, Isometry3, Problem, Surfel};
 
 use crate::length::Length;
-use crate::scratch::Scratch;
 use crate::selection::all_samples::AllSamples;
 use crate::selection::keep::keep_positions;
 use crate::selection::point_selection::PointSelection;

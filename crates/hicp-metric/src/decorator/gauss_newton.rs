@@ -1,5 +1,6 @@
 //! Gauss–Newton iterations over fixed pairs.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Isometry3, Iteration, se3};
 
 use crate::decorator::moved::{compose, move_sources};
@@ -16,7 +17,7 @@ use crate::metric::minimize::Minimize;
 ///
 /// If the first linearization gives no step, neither does this. A later one without a step ends the
 /// iterations.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GaussNewton<M> {
     /// The metric to minimize.
     pub metric: M,
@@ -26,7 +27,7 @@ pub struct GaussNewton<M> {
     ///
     /// It is relative to the RMS radius. Rotations count as displacements at that radius.
     pub tolerance: f64,
-    moved: Correspondences,
+    moved: Scratch<Correspondences>,
 }
 
 impl<M> GaussNewton<M> {
@@ -37,7 +38,7 @@ impl<M> GaussNewton<M> {
             metric,
             max_iterations: 10,
             tolerance: 1e-6,
-            moved: Correspondences::new(),
+            moved: Scratch::default(),
         }
     }
 }
@@ -60,8 +61,8 @@ impl<M: Minimize> Minimize for GaussNewton<M> {
             let system = if pass == 0 {
                 self.metric.system(iteration, pairs)
             } else {
-                move_sources(pairs, &increment, &mut self.moved);
-                self.metric.system(iteration, &self.moved)
+                move_sources(pairs, &increment, &mut self.moved.0);
+                self.metric.system(iteration, &self.moved.0)
             };
             let Some(solution) = system.and_then(|system| system.solution(0.0)) else {
                 if pass == 0 {

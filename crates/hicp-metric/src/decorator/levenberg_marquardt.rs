@@ -2,6 +2,7 @@
 
 use std::mem;
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Isometry3, Iteration, se3};
 
 use crate::decorator::moved::{compose, move_sources};
@@ -27,7 +28,7 @@ const MIN_DAMPING: f64 = 1e-12;
 /// If the first linearization gives no step, neither does this. If no step lowers the loss, the
 /// increment is the identity. Cost per iteration: three passes, to move the pairs, to compute the
 /// loss, and to linearize.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LevenbergMarquardt<M> {
     /// The metric to minimize.
     pub metric: M,
@@ -39,8 +40,8 @@ pub struct LevenbergMarquardt<M> {
     pub tolerance: f64,
     /// λ of the first step, relative to the diagonal; default 10⁻³.
     pub initial_damping: f64,
-    current: Correspondences,
-    trial: Correspondences,
+    current: Scratch<Correspondences>,
+    trial: Scratch<Correspondences>,
 }
 
 impl<M> LevenbergMarquardt<M> {
@@ -52,8 +53,8 @@ impl<M> LevenbergMarquardt<M> {
             max_iterations: 20,
             tolerance: 1e-6,
             initial_damping: 1e-3,
-            current: Correspondences::new(),
-            trial: Correspondences::new(),
+            current: Scratch::default(),
+            trial: Scratch::default(),
         }
     }
 }
@@ -83,18 +84,18 @@ impl<M: Minimize> Minimize for LevenbergMarquardt<M> {
             };
             let next = compose(&solution.increment, &increment);
             let tried = if se3::is_finite(&next) {
-                move_sources(pairs, &next, &mut self.trial);
-                self.metric.mean_loss(iteration, &self.trial)
+                move_sources(pairs, &next, &mut self.trial.0);
+                self.metric.mean_loss(iteration, &self.trial.0)
             } else {
                 None
             };
             let done = solution.size <= self.tolerance;
             match tried {
                 Some(lower) if lower < loss => {
-                    mem::swap(&mut self.current, &mut self.trial);
+                    mem::swap(&mut self.current.0, &mut self.trial.0);
                     (increment, loss) = (next, lower);
                     damping = (damping / FACTOR).max(MIN_DAMPING);
-                    match self.metric.system(iteration, &self.current) {
+                    match self.metric.system(iteration, &self.current.0) {
                         Some(anew) if !done => system = anew,
                         _ => break,
                     }

@@ -1,5 +1,6 @@
 //! Robust kernels over any metric.
 
+use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Iteration, Pair};
 
 use crate::decorator::kernel::{Kernel, RobustKernel};
@@ -52,7 +53,7 @@ impl Default for Scale {
 /// The kernel belongs to the set of pairs: squared errors are those of the inner metric, and
 /// [`Minimize::system`] contains the weights. Any [`RobustKernel`] can be used. Cost: one pass for
 /// the residuals, one to copy the pairs, a selection for the median, and the inner metric.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Robust<M, K = Kernel> {
     /// The metric to minimize.
     pub metric: M,
@@ -60,9 +61,9 @@ pub struct Robust<M, K = Kernel> {
     pub kernel: K,
     /// The scale of residuals; by default the median with a floor of 1 mm.
     pub scale: Scale,
-    reweighted: Correspondences,
-    residuals: Vec<f64>,
-    sorted: Vec<f64>,
+    reweighted: Scratch<Correspondences>,
+    residuals: Scratch<Vec<f64>>,
+    sorted: Scratch<Vec<f64>>,
 }
 
 impl<M: Minimize, K: RobustKernel> Robust<M, K> {
@@ -73,37 +74,37 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
             metric,
             kernel,
             scale,
-            reweighted: Correspondences::new(),
-            residuals: Vec::new(),
-            sorted: Vec::new(),
+            reweighted: Scratch::default(),
+            residuals: Scratch::default(),
+            sorted: Scratch::default(),
         }
     }
 
     /// Computes the residuals and returns σ, or `None` if it is not finite.
     fn measure(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
-        self.residuals.clear();
-        self.residuals.resize(pairs.len(), 0.0);
+        self.residuals.0.clear();
+        self.residuals.0.resize(pairs.len(), 0.0);
         self.metric
-            .add_squared_errors(iteration, pairs, 1.0, &mut self.residuals);
-        for residual in &mut self.residuals {
+            .add_squared_errors(iteration, pairs, 1.0, &mut self.residuals.0);
+        for residual in &mut self.residuals.0 {
             *residual = residual.sqrt();
         }
         let pairs = pairs.as_slice();
         let sigma = match self.scale {
             Scale::Meters(sigma) => sigma,
             Scale::Mad { floor_meters } => {
-                self.sorted.clear();
-                let counting = pairs.iter().zip(&self.residuals);
-                self.sorted.extend(
+                self.sorted.0.clear();
+                let counting = pairs.iter().zip(&self.residuals.0);
+                self.sorted.0.extend(
                     counting
                         .filter(|(pair, _)| pair.weight > 0.0)
                         .map(|(_, residual)| *residual),
                 );
-                let middle = self.sorted.len() / 2;
-                if self.sorted.is_empty() {
+                let middle = self.sorted.0.len() / 2;
+                if self.sorted.0.is_empty() {
                     return None;
                 }
-                let (_, median, _) = self.sorted.select_nth_unstable_by(middle, f64::total_cmp);
+                let (_, median, _) = self.sorted.0.select_nth_unstable_by(middle, f64::total_cmp);
                 let sigma = SIGMA_PER_MAD * *median;
                 if !sigma.is_finite() {
                     return None;
@@ -120,9 +121,10 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
         let sigma = self.measure(iteration, pairs)?;
         let kernel = &self.kernel;
         self.reweighted
+            .0
             .begin(pairs.camera_from_object(), pairs.n_candidates());
-        let weighted = pairs.as_slice().iter().zip(&self.residuals);
-        self.reweighted.extend(weighted.map(|(pair, residual)| {
+        let weighted = pairs.as_slice().iter().zip(&self.residuals.0);
+        self.reweighted.0.extend(weighted.map(|(pair, residual)| {
             #[allow(clippy::cast_possible_truncation)] // The weight of a pair is an f32.
             let weight = (f64::from(pair.weight) * kernel.weight(residual / sigma)) as f32;
             Pair { weight, ..*pair }
@@ -133,7 +135,7 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
     /// Returns Σ w 2σ² ρ(r/σ) / Σ w over the last residuals.
     fn loss(&self, pairs: &Correspondences, sigma: f64) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);
-        for (pair, residual) in pairs.as_slice().iter().zip(&self.residuals) {
+        for (pair, residual) in pairs.as_slice().iter().zip(&self.residuals.0) {
             let w = f64::from(pair.weight);
             sum += w * self.kernel.loss(residual / sigma);
             weight += w;
@@ -159,12 +161,12 @@ impl<M: Minimize, K: RobustKernel> Minimize for Robust<M, K> {
         pairs: &Correspondences,
     ) -> Option<NormalEquations> {
         self.reweigh(iteration, pairs)?;
-        self.metric.system(iteration, &self.reweighted)
+        self.metric.system(iteration, &self.reweighted.0)
     }
 
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
         let mean_loss = self.reweigh(iteration, pairs)?;
-        let step = self.metric.minimize(iteration, &self.reweighted)?;
+        let step = self.metric.minimize(iteration, &self.reweighted.0)?;
         Some(Step { mean_loss, ..step })
     }
 

@@ -302,3 +302,19 @@ fn metrics_report_their_names() {
         assert_eq!(metric.label(), name);
     }
 }
+
+/// Scratch memory of earlier steps is not part of a decorator's value.
+#[test]
+fn decorators_compare_by_their_options() {
+    let pairs = messy(&mut Numbers(9), 40);
+    fn unchanged<M: Minimize + Clone + PartialEq>(mut metric: M, pairs: &Correspondences) -> bool {
+        let fresh = metric.clone();
+        metric.minimize(&Iteration::default(), pairs).unwrap();
+        metric == fresh
+    }
+    let robust = Robust::new(PointToPlane, Kernel::TUKEY, Scale::default());
+    assert!(unchanged(robust.clone(), &pairs));
+    assert!(unchanged(GaussNewton::new(PointToPlane), &pairs));
+    assert!(unchanged(LevenbergMarquardt::new(PointToPlane), &pairs));
+    assert_ne!(robust, Robust::default());
+}

@@ -6,11 +6,10 @@ mod mask_border;
 mod silhouette;
 mod split;
 
-use hicp_core::internal::{Surroundings, index};
+use hicp_core::internal::{Scratch, Surroundings, index};
 use hicp_core::{Context, Correspondences, Isometry3, Pair, Problem, Surfel, UnitVector3, Vector3};
 
 use crate::association::data_association::DataAssociation;
-use crate::scratch::Scratch;
 
 use evidence::Evidence;
 use line::Line;

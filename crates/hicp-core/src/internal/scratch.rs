@@ -6,7 +6,7 @@ use std::fmt;
 ///
 /// Any two are equal, and a clone starts empty.
 #[derive(Default)]
-pub(crate) struct Scratch<T>(pub(crate) T);
+pub struct Scratch<T>(pub T);
 
 impl<T: Default> Clone for Scratch<T> {
     fn clone(&self) -> Self {
