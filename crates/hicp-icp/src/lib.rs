@@ -30,7 +30,7 @@ mod stage;
 mod stop;
 
 pub use alternative::Alternative;
-pub use observer::{IterationEvent, Observer, Regime, RegimeEvent, StageEvent};
+pub use observer::{DecisionEvent, IterationEvent, Observer, Regime, RegimeEvent, StageEvent};
 pub use outcome::{Evaluation, Outcome, Quality, Termination, Verdict};
 pub use session::{Session, Workspace};
 pub use stage::*;

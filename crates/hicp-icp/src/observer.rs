@@ -32,6 +32,14 @@ pub trait Observer {
         let _ = event;
     }
 
+    /// Receives the decision of a stage about a pose that it scored.
+    ///
+    /// [`Guard`](crate::Guard), [`KeepBest`](crate::KeepBest), `SwitchUntilStall` and
+    /// [`HypothesisSearch`](crate::HypothesisSearch) report them.
+    fn on_decision(&mut self, event: &DecisionEvent<'_>) {
+        let _ = event;
+    }
+
     /// Receives the outcome of an ICP stage. Composed stages report through their parts.
     fn on_stage_end(&mut self, event: &StageEvent<'_>) {
         let _ = event;
@@ -50,6 +58,10 @@ macro_rules! forward {
 
             fn on_regime(&mut self, event: &RegimeEvent) {
                 (**self).on_regime(event);
+            }
+
+            fn on_decision(&mut self, event: &DecisionEvent<'_>) {
+                (**self).on_decision(event);
             }
 
             fn on_stage_end(&mut self, event: &StageEvent<'_>) {
@@ -75,6 +87,11 @@ macro_rules! all {
             fn on_regime(&mut self, event: &RegimeEvent) {
                 let ($($member,)+) = self;
                 $($member.on_regime(event);)+
+            }
+
+            fn on_decision(&mut self, event: &DecisionEvent<'_>) {
+                let ($($member,)+) = self;
+                $($member.on_decision(event);)+
             }
 
             fn on_stage_end(&mut self, event: &StageEvent<'_>) {
@@ -152,6 +169,42 @@ pub struct RegimeEvent {
     pub regime: Regime,
     /// The score that decided, if there is one.
     pub score: Option<f64>,
+}
+
+/// The decision of a stage whether it keeps a pose that it scored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct DecisionEvent<'a> {
+    /// Name of the stage that decides.
+    pub stage: &'static str,
+    /// The scored pose.
+    pub camera_from_object: &'a Isometry3<f64>,
+    /// Its score; lower is better.
+    pub score: f64,
+    /// The score of the best pose before it; infinity if there was none.
+    pub best: f64,
+    /// `true` if the stage keeps the pose, `false` if it rejects it.
+    pub kept: bool,
+}
+
+impl<'a> DecisionEvent<'a> {
+    /// Creates the decision of a custom stage.
+    #[must_use]
+    pub fn new(
+        stage: &'static str,
+        camera_from_object: &'a Isometry3<f64>,
+        score: f64,
+        best: f64,
+        kept: bool,
+    ) -> Self {
+        Self {
+            stage,
+            camera_from_object,
+            score,
+            best,
+            kept,
+        }
+    }
 }
 
 /// The end of an ICP stage.

@@ -1,4 +1,4 @@
-//! An observer: reports every iteration, switch and stage.
+//! An observer: reports every iteration, switch, decision and stage.
 //!
 //! `cargo run --release -p hybrid-icp --example 04_observer`
 
@@ -8,7 +8,7 @@ use std::error::Error;
 use std::ops::ControlFlow;
 
 use hybrid_icp::core::{Isometry3, se3};
-use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
+use hybrid_icp::icp::{DecisionEvent, IterationEvent, Observer, RegimeEvent, StageEvent};
 use hybrid_icp::{Preset, Refiner};
 
 mod scene;
@@ -34,6 +34,14 @@ impl Observer for Table {
             distance * 1e3
         );
         ControlFlow::Continue(()) // `Break` would end the stage here.
+    }
+
+    fn on_decision(&mut self, event: &DecisionEvent<'_>) {
+        let verb = if event.kept { "keeps" } else { "rejects" };
+        println!(
+            "-- {} {verb} a score of {:.3} after {:.3}",
+            event.stage, event.score, event.best
+        );
     }
 
     fn on_stage_end(&mut self, event: &StageEvent<'_>) {

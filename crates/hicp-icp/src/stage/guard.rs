@@ -3,6 +3,7 @@
 use hicp_core::{Isometry3, Problem};
 use hicp_score::Score;
 
+use crate::observer::DecisionEvent;
 use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::stage_trait::Stage;
@@ -35,8 +36,12 @@ impl<S: Stage, C: Score> Stage for Guard<S, C> {
         }
         let mut context = session.context(problem);
         let before = self.score.score(&mut context, init);
-        let after = self.score.score(&mut context, &outcome.camera_from_object);
-        if after < before {
+        let pose = &outcome.camera_from_object;
+        let after = self.score.score(&mut context, pose);
+        let kept = after < before;
+        let event = DecisionEvent::new(self.name(), pose, after, before, kept);
+        session.observer.on_decision(&event);
+        if kept {
             outcome
         } else {
             Outcome {
@@ -88,8 +93,12 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
                 break;
             }
             let mut context = session.context(problem);
-            let score = self.score.score(&mut context, &last.camera_from_object);
-            if score < best.0 {
+            let pose = &last.camera_from_object;
+            let score = self.score.score(&mut context, pose);
+            let kept = score < best.0;
+            let event = DecisionEvent::new(self.name(), pose, score, best.0, kept);
+            session.observer.on_decision(&event);
+            if kept {
                 best = (score, last);
             }
         }

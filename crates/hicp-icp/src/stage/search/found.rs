@@ -91,19 +91,21 @@ impl FoundPoses {
         poses.min_by(|a, b| a.cost().total_cmp(&b.cost()))
     }
 
-    /// Adds a pose. Of two poses that are not distinct, the one with the lower cost stays.
-    pub(crate) fn add(&mut self, found: Found, distinct: &Distinct) {
+    /// Adds a pose and returns whether it stays. Of two poses that are not distinct, the one with
+    /// the lower cost does.
+    pub(crate) fn add(&mut self, found: Found, distinct: &Distinct) -> bool {
         let pose = found.outcome.camera_from_object;
         let same = |other: &Found| !distinct.apart(&other.outcome.camera_from_object, &pose);
         let better = |other: &Found| other.cost() <= found.cost() && same(other);
         if self.poses.iter().any(better) {
-            return;
+            return false;
         }
         self.poses.retain(|other| !same(other));
         let place = self
             .poses
             .partition_point(|other| other.score <= found.score);
         self.poses.insert(place, found);
+        true
     }
 
     /// Removes the best pose that is not fitted, up to a gap to the best score.

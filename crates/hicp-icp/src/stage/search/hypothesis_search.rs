@@ -44,6 +44,9 @@ use crate::stage::stage_trait::Stage;
 /// is returned: the rotation of a can is often known from elsewhere. The others are in
 /// [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
+/// The observer receives every refined pose as a decision: it is kept if it joins the list of poses
+/// found. The pose that replaces the local one is the last decision.
+///
 /// **This is not local refinement.** Unless a bound is set, it can end anywhere in the image, also
 /// at an equivalent pose of an object that looks the same from several sides.
 ///
@@ -134,7 +137,9 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
                 Progress::Explored => scored,
                 Progress::Fitted | Progress::Refined => self.judged(run, scored, progress),
             };
-            self.found.add(found, &run.distinct);
+            let best = self.found.best().map_or(f64::INFINITY, |best| best.score);
+            let kept = self.found.add(found, &run.distinct);
+            run.report(pose, (found.score, best), kept);
         }
     }
 
@@ -447,6 +452,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
                 self.nearest_alike(&mut run, &best)
             };
             let best = nearest.filter(|found| wins(found, 0.0)).unwrap_or(best);
+            run.report(&best.outcome.camera_from_object, (best.score, score), true);
             (returned, score) = (best.outcome, best.score);
         }
         self.found.list_alternatives(

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use hicp_core::{Isometry3, Problem};
 use hicp_score::Score;
 
+use crate::observer::DecisionEvent;
 use crate::outcome::{Outcome, Termination};
 use crate::session::Session;
 use crate::stage::search::distinct::Distinct;
@@ -37,6 +38,12 @@ impl Run<'_, '_> {
         self.iterations += outcome.iterations;
         self.stopped |= outcome.termination == Termination::Stopped;
         outcome
+    }
+
+    /// Reports a pose, and the score of the best one before it, to the observer.
+    pub(crate) fn report(&mut self, pose: &Isometry3<f64>, (score, best): (f64, f64), kept: bool) {
+        let event = DecisionEvent::new("hypothesis-search", pose, score, best, kept);
+        self.session.observer.on_decision(&event);
     }
 
     /// Returns whether a pose lies within the bound.
