@@ -1,26 +1,27 @@
 //! The stage that switches until the score stalls.
 
 use hicp_core::{Isometry3, Problem};
-use hicp_icp::{Outcome, Regime, RegimeEvent, Session, Stage, Termination, Verdict};
-use hicp_score::Score;
+use hicp_icp::{DecisionEvent, Outcome, Regime, RegimeEvent, Session, Stage, Termination, Verdict};
+
+use crate::switcher::Switcher;
 
 /// Runs Dynamic Switching until the score stalls, and returns the best pose.
 ///
-/// A step starts from the best pose so far. It runs `aligned` if the score of that pose is below
-/// `alpha`, otherwise `misaligned`. A step that lowers the score by less than `min_gain` is a
-/// stall. Then the other stage is tried once, and if that is a stall, too, the iteration ends. It
-/// also ends if the score is at or below `good_enough`, but not before the first step.
+/// A step starts from the best pose so far. It runs the stage that the switcher selects there, as
+/// in [`Switch`](crate::Switch). The score is that of the switcher, which is lower if a pose is
+/// better. A step that lowers the score by less than `min_gain` is a stall. Then the other stage is
+/// tried once, and if that is a stall, too, the iteration ends. It also ends if the score is at or
+/// below `good_enough`, but not before the first step.
 ///
 /// **Contract**: the score of the returned pose is never above that of the initial one. Unless its
-/// score is lower, the returned pose is the initial one, bit for bit.
+/// score is lower, the returned pose is the initial one, bit for bit. This includes a switcher
+/// without a score.
 ///
-/// Cost: a score, and at most `max_steps` × (a stage and a score).
+/// Cost: a choice, and at most `max_steps` × (a stage and a choice).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SwitchUntilStall<C, A, M> {
-    /// The score, lower is better: the MVE, as in [`Threshold`](crate::Threshold).
-    pub score: C,
-    /// The smallest score of a misaligned estimate.
-    pub alpha: f64,
+pub struct SwitchUntilStall<W, A, M> {
+    /// Selects the regime of a pose, and scores it: a [`Threshold`](crate::Threshold) on the MVE.
+    pub switcher: W,
     /// The stage for an estimate that agrees with the image.
     pub aligned: A,
     /// The stage for an estimate that does not agree with the image.
@@ -33,36 +34,36 @@ pub struct SwitchUntilStall<C, A, M> {
     pub good_enough: f64,
 }
 
-impl<C: Score, A: Stage, M: Stage> Stage for SwitchUntilStall<C, A, M> {
+impl<W: Switcher, A: Stage, M: Stage> Stage for SwitchUntilStall<W, A, M> {
     fn run(
         &mut self,
         problem: &Problem<'_>,
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
-        if let Some(part) = self.score.unsupported(problem) {
+        if let Some(part) = self.switcher.unsupported(problem) {
             return Outcome::kept(init, Termination::Unsupported(part));
         }
         let mut judge = |pose: &Isometry3<f64>, session: &mut Session<'_>| {
-            let mut context = session.context(problem);
-            self.score.score(&mut context, pose)
+            self.switcher.regime(&mut session.context(problem), pose)
         };
-        let mut score = judge(init, session);
+        let score = |event: &RegimeEvent| event.score.unwrap_or(f64::MAX);
+        let mut held = judge(init, session);
         let mut best = Outcome::kept(init, Termination::IterationLimit);
         let mut iterations = 0;
         let mut other = false;
         for step in 0..self.max_steps {
-            if step > 0 && score <= self.good_enough {
+            if step > 0 && score(&held) <= self.good_enough {
                 break;
             }
-            let aligned = (score < self.alpha) != other;
+            let aligned = (held.regime == Regime::ALIGNED) != other;
             session.observer.on_regime(&RegimeEvent {
                 regime: if aligned {
                     Regime::ALIGNED
                 } else {
                     Regime::MISALIGNED
                 },
-                score: Some(score),
+                score: held.score,
             });
             let start = best.camera_from_object;
             let next = if aligned {
@@ -73,11 +74,17 @@ impl<C: Score, A: Stage, M: Stage> Stage for SwitchUntilStall<C, A, M> {
             iterations += next.iterations;
             let found = match next.verdict {
                 Verdict::Refined => judge(&next.camera_from_object, session),
-                Verdict::KeptInitial(_) => score,
+                Verdict::KeptInitial(_) => held,
             };
-            let gain = score - found;
+            let gain = score(&held) - score(&found);
+            if next.verdict == Verdict::Refined {
+                let (pose, kept) = (&next.camera_from_object, gain > 0.0);
+                let scores = (score(&found), score(&held));
+                let event = DecisionEvent::new("alternate", pose, scores.0, scores.1, kept);
+                session.observer.on_decision(&event);
+            }
             if gain > 0.0 {
-                (score, best) = (found, best.then(next));
+                (held, best) = (found, best.then(next));
             } else if best.verdict != Verdict::Refined {
                 best = match next.verdict {
                     Verdict::Refined => Outcome::kept(init, Termination::ScoreNotImproved),

@@ -93,10 +93,13 @@ pub(super) fn add(catalog: &mut Catalog) {
             pose with the best score. Source: §IV-A.2, repeated. Cost: max_steps × (a stage and a \
             score).";
         let stage = SwitchUntilStall {
-            score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
-            alpha: p.number("alpha", FACTOR, 0.4, "score of a misaligned pose")?,
-            aligned: p.part::<BoxedStage>("aligned", None, "runs below alpha")?,
-            misaligned: p.part::<BoxedStage>("misaligned", None, "runs from alpha on")?,
+            switcher: p.part::<BoxedSwitcher>("switcher", "threshold", "selects and scores")?,
+            aligned: p.part::<BoxedStage>(
+                "aligned",
+                None,
+                "runs if the estimate fits the image",
+            )?,
+            misaligned: p.part::<BoxedStage>("misaligned", None, "runs if it does not")?,
             max_steps: p.count("max_steps", 0, 4, "largest number of steps")?,
             min_gain: p.number("min_gain", FACTOR, 0.01, "smaller gains count as a stall")?,
             good_enough: p.number("good_enough", FACTOR, 0.0, "score that ends it")?,

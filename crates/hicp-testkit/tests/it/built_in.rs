@@ -348,8 +348,10 @@ fn built_in_stages_keep_the_laws() {
     );
     check_stage(
         || SwitchUntilStall {
-            score: MeanVsd::default(),
-            alpha: 0.4,
+            switcher: Threshold {
+                score: MeanVsd::default(),
+                alpha: 0.4,
+            },
             aligned: fine(),
             misaligned: Preset::NnPointToPoint.build(),
             max_steps: 3,

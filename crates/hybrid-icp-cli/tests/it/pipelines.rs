@@ -88,12 +88,16 @@ fn wrong_pipelines_are_refused_with_their_place() {
     assert!(error.contains("/nowhere/there.toml"), "{error}");
 
     let (code, _, error) = demo(
-        &["--set", "stage.stages.1.misaligned.stages.1.alpah=0.5"],
+        &[
+            "--set",
+            "stage.stages.1.misaligned.stages.1.switcher.alpah=0.5",
+        ],
         picture,
     );
     assert_eq!(code, Some(1));
     assert!(
-        error.contains("stage.stages.1.misaligned.stages.1.alpah") && error.contains("\"alpha\"?"),
+        error.contains("stage.stages.1.misaligned.stages.1.switcher.alpah")
+            && error.contains("\"alpha\"?"),
         "{error}"
     );
 

@@ -44,7 +44,7 @@ pub type Fit = Icp<
     (Convergence, IterationLimit),
 >;
 /// The steps of [`local`] from doubtful poses.
-pub type Steps = SwitchUntilStall<MeanVsd, Cascade<(Near, Fit)>, Cascade<(Far, Fit)>>;
+pub type Steps = SwitchUntilStall<Threshold<MeanVsd>, Cascade<(Near, Fit)>, Cascade<(Far, Fit)>>;
 /// The type of [`local`].
 pub type Local = Cascade<(
     Guard<Fit, MeanVsd>,
@@ -215,8 +215,10 @@ pub fn local() -> Local {
     let mut short = fit();
     short.stop.1 = IterationLimit(4);
     let steps = SwitchUntilStall {
-        score: MeanVsd::imperfect_mask(),
-        alpha: PAPER_ALPHA,
+        switcher: Threshold {
+            score: MeanVsd::imperfect_mask(),
+            alpha: PAPER_ALPHA,
+        },
         aligned: Cascade((near(PointToPlane, 2000), short.clone())),
         misaligned: Cascade((far(), short)),
         max_steps: 6,
