@@ -42,7 +42,8 @@
 //! trait and chain as tuples, in order. Associations join: a pair of them, or a `Vec`, gives the
 //! pairs of all.
 //!
-//! [`estimate_normals`] and [`voxel_downsample`] prepare point clouds.
+//! [`estimate_normals`] and [`voxel_downsample`] prepare point clouds. [`PointSearch`] finds
+//! nearest points for custom components.
 
 // Image sizes and counts are converted to floating point; all are far below 2²⁴.
 #![allow(clippy::cast_precision_loss)]
@@ -60,5 +61,6 @@ pub use association::*;
 pub use cloud::*;
 pub use filter::*;
 pub use length::Length;
+pub use search::{Nearest, PointSearch};
 pub use selection::*;
 pub use stride::Stride;

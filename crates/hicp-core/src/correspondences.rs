@@ -16,7 +16,8 @@ pub struct Pair {
     /// The index of the source element; equal indices mean the same element.
     ///
     /// It is an index into the selection. For an association that starts from the observation, it
-    /// is an index into the model's elements.
+    /// is an index into the model's elements. To look up data of model or cloud points behind a
+    /// selection, search by position with `hicp_association::PointSearch`.
     pub source_index: u32,
     /// The index of the target element: row-major in the observation's region, see
     /// [`Observation::surfel`](crate::Observation::surfel). [`Pair::UNLISTED`] for other points.

@@ -5,5 +5,9 @@ pub(crate) mod box_tree;
 pub(crate) mod kd_tree;
 pub(crate) mod nearest;
 pub(crate) mod observed_points;
+pub(crate) mod point_search;
 pub(crate) mod point_tree;
 pub(crate) mod triangle;
+
+pub use nearest::Nearest;
+pub use point_search::PointSearch;

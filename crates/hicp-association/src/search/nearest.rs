@@ -11,13 +11,13 @@ pub(crate) fn distance_squared(a: &Point3<f32>, b: &Point3<f32>) -> f32 {
     x * x + y * y + z * z
 }
 
-/// The result of a search.
+/// A point that a search found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Nearest {
+pub struct Nearest {
     /// Squared distance, m², finite.
-    pub(crate) distance_squared: f32,
+    pub distance_squared: f32,
     /// Index of the point in the order in which the points were given.
-    pub(crate) element: u32,
+    pub element: u32,
 }
 
 impl Nearest {

@@ -1,7 +1,7 @@
 //! Tests of nearest neighbors against brute force (pitfall 26).
 
 use crate::support::{Numbers, RayCaster, cuboid, depth_image, observe_depth, sphere_depth};
-use hicp_association::{DataAssociation, NearestNeighbor, SearchIndex, Stride};
+use hicp_association::{DataAssociation, NearestNeighbor, PointSearch, SearchIndex, Stride};
 use hicp_core::{
     Cloud, Context, Correspondences, DepthImage, Isometry3, Mask, Model, Observation,
     PinholeCamera, Point3, Problem, RenderCache, RigidTransform, Surfel, UnitVector3, Vector3,
@@ -242,4 +242,31 @@ fn strides_of_one_observation_do_not_share_a_tree() {
             &Isometry3::translation(0.0, 0.0, 0.4),
         );
     }
+}
+
+#[test]
+fn a_point_search_equals_brute_force_and_skips_what_is_not_finite() {
+    let mut numbers = Numbers(17);
+    let mut points: Vec<_> = surfels(&mut numbers, 300, 1.0)
+        .iter()
+        .map(|s| s.point)
+        .collect();
+    for place in [0, 7, 299] {
+        points[place].y = f32::NAN;
+    }
+    let search = PointSearch::new(points.iter().copied());
+    let mut found = Vec::new();
+    for query in surfels(&mut numbers, 50, 1.5).iter().map(|s| s.point) {
+        let distance = |i: u32| (points[i as usize] - query).norm_squared();
+        let mut order: Vec<u32> = (0..300).filter(|i| distance(*i).is_finite()).collect();
+        order.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        search.nearest_n(&query, 5, &mut found);
+        let elements: Vec<u32> = found.iter().map(|nearest| nearest.element).collect();
+        assert_eq!(elements, order[..5]);
+        assert_eq!(search.nearest(&query), Some(found[0]));
+        assert!((found[4].distance_squared - distance(order[4])).abs() < 1e-6);
+    }
+    let nowhere = points[0];
+    assert_eq!(search.nearest(&nowhere), None);
+    assert_eq!(PointSearch::new([]).nearest(&points[1]), None);
 }
