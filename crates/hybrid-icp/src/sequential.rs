@@ -51,11 +51,16 @@ use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, 
 pub struct SequentialEstimator {
     stage: BoxedStage,
     fuser: BoxedFuser,
-    config: SequentialConfig,
+    covariance: Box<Covariance>,
+    score: Option<Box<dyn Score + Send>>,
+    without_pairs: WithoutPairs,
     workspace: Workspace,
     /// The initial pose in the current camera frame.
     init: Isometry3<f64>,
 }
+
+/// The covariance of an estimate, from the outcome of its registration and its score.
+type Covariance = dyn Fn(&Outcome, Option<f64>) -> Matrix6<f64> + Send;
 
 impl SequentialEstimator {
     /// Creates an estimator from any stage and any fuser.
@@ -74,7 +79,9 @@ impl SequentialEstimator {
         let mut estimator = Self {
             stage: Box::new(stage),
             fuser: Box::new(fuser),
-            config,
+            covariance: Box::new(move |outcome, mve| of_model(&config.covariance, outcome, mve)),
+            score: config.score.map(|score| Box::new(score) as _),
+            without_pairs: config.without_pairs,
             workspace: Workspace::new(Rasterizer::default()),
             init: *init,
         };
@@ -173,6 +180,43 @@ impl SequentialEstimator {
         Self::new(stage, method.build(FuserConfig::paper()), config, init)
     }
 
+    /// Replaces the model of covariances by a function of a single estimate.
+    ///
+    /// It receives the outcome of the registration and the score, and returns the covariance of
+    /// ξ = [ρ; φ] in the camera frame (left perturbation, meters and radians). It must be pure. A
+    /// matrix that is not a covariance is reported as [`SequentialEvent::Refused`].
+    ///
+    /// ```
+    /// use hybrid_icp::SequentialEstimator;
+    /// use hybrid_icp::core::Matrix6;
+    ///
+    /// /// Variances of 1 mm² and 10⁻⁴ rad² over the share of paired points.
+    /// fn by_fitness(estimator: SequentialEstimator) -> SequentialEstimator {
+    ///     estimator.with_covariance(|outcome, _mve| {
+    ///         let fitness = outcome.quality.map_or(0.01, |quality| quality.fitness.max(0.01));
+    ///         let variance = |i: usize| if i < 3 { 1e-6 } else { 1e-4 };
+    ///         Matrix6::from_fn(|i, j| if i == j { variance(i) / fitness } else { 0.0 })
+    ///     })
+    /// }
+    /// ```
+    #[must_use]
+    pub fn with_covariance(
+        mut self,
+        covariance: impl Fn(&Outcome, Option<f64>) -> Matrix6<f64> + Send + 'static,
+    ) -> Self {
+        self.covariance = Box::new(covariance);
+        self
+    }
+
+    /// Replaces the score of each estimate, which gates and covariances use as the MVE.
+    ///
+    /// An estimate with a score above 1 is reported as [`SequentialEvent::Refused`].
+    #[must_use]
+    pub fn with_score(mut self, score: impl Score + Send + 'static) -> Self {
+        self.score = Some(Box::new(score));
+        self
+    }
+
     /// Restarts from a rough pose in the current camera frame, and keeps the scratch memory.
     ///
     /// # Errors
@@ -258,21 +302,14 @@ impl SequentialEstimator {
         // A guard keeps a good initial pose, and a search returns one, without pairs.
         let guarded = outcome.termination == Termination::ScoreNotImproved;
         let found = outcome.evaluation.is_some() || outcome.verdict == Verdict::Refined || guarded;
-        if !found && self.config.without_pairs == WithoutPairs::Nothing {
+        if !found && self.without_pairs == WithoutPairs::Nothing {
             return (None, SequentialEvent::NoEstimate(outcome.termination));
         }
         let pose = &outcome.camera_from_object;
         let workspace = &mut self.workspace;
-        let score = self.config.score.as_mut();
+        let score = self.score.as_mut();
         let mve = score.map(|score| score.score(&mut workspace.context(problem), pose));
-        let registration = match self.config.covariance {
-            CovarianceModel::Inflated(_) => outcome.quality.as_ref().and_then(Quality::covariance),
-            _ => None,
-        };
-        let covariance = self
-            .config
-            .covariance
-            .covariance(pose, mve, registration.as_ref());
+        let covariance = (self.covariance)(outcome, mve);
         let estimate = PoseEstimate::new(*pose, covariance).and_then(|estimate| match mve {
             Some(mve) => estimate.with_mve(mve),
             None => Ok(estimate),
@@ -283,6 +320,15 @@ impl SequentialEstimator {
         };
         (mve, event)
     }
+}
+
+/// Returns the covariance of an outcome by one of the models.
+fn of_model(model: &CovarianceModel, outcome: &Outcome, mve: Option<f64>) -> Matrix6<f64> {
+    let registration = match model {
+        CovarianceModel::Inflated(_) => outcome.quality.as_ref().and_then(Quality::covariance),
+        _ => None,
+    };
+    model.covariance(&outcome.camera_from_object, mve, registration.as_ref())
 }
 
 /// Puts a fuser behind the gate of an object.
@@ -302,7 +348,7 @@ impl std::fmt::Debug for SequentialEstimator {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("SequentialEstimator")
             .field("fuser", &self.fuser.name())
-            .field("config", &self.config)
+            .field("without_pairs", &self.without_pairs)
             .field("init", &self.init)
             .finish_non_exhaustive()
     }

@@ -10,11 +10,13 @@ use hicp_score::MeanVsd;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SequentialConfig {
-    /// Source of the covariance of an estimate.
+    /// Source of the covariance of an estimate. For a custom one, see
+    /// [`SequentialEstimator::with_covariance`](crate::SequentialEstimator::with_covariance).
     pub covariance: CovarianceModel,
     /// The score of each estimate against its image.
     ///
-    /// If neither the fuser nor the covariance needs an MVE, `None` saves a render.
+    /// If neither the fuser nor the covariance needs an MVE, `None` saves a render. For a custom
+    /// score, see [`SequentialEstimator::with_score`](crate::SequentialEstimator::with_score).
     pub score: Option<MeanVsd>,
     /// The pose that is fused if ICP finds no pairs.
     pub without_pairs: WithoutPairs,

@@ -4,12 +4,15 @@ use std::time::{Duration, Instant};
 
 use hicp_sim::{Household, RelativeGaussian, perturb, rng};
 use hicp_tests::{camera, median, render, symmetric_pose_distance};
-use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, Observation, Problem, Vector6, se3};
+use hybrid_icp::core::{
+    Context, DepthImage, Isometry3, Mask, Matrix6, Model, Observation, Problem, Vector6, se3,
+};
 use hybrid_icp::fusion::{
     CameraMotion, CovarianceModel, Failure, FuserConfig, FusionError, FusionMethod, Gate, Gated,
     InflatedCovariance, UnitCovariance, Update,
 };
 use hybrid_icp::icp::{Outcome, Session, Stage};
+use hybrid_icp::score::Score;
 use hybrid_icp::{
     Calibration, Preset, SequentialConfig, SequentialEstimator, SequentialEvent, Trace, presets,
 };
@@ -268,6 +271,35 @@ fn the_covariance_of_the_registration_reaches_the_fuser() {
     let (observation, _, motion) = &path.frames[1];
     let second = estimator.step(model, observation, motion).covariance;
     assert!(second.expect("an estimate").determinant() < 0.5 * found.determinant());
+}
+
+struct Fixed(f64);
+
+impl Score for Fixed {
+    fn score(&mut self, _: &mut Context<'_>, _: &Isometry3<f64>) -> f64 {
+        self.0
+    }
+}
+
+#[test]
+fn a_custom_score_and_covariance_reach_the_fuser() {
+    let path = path(Household::Mug, 1, 0.3, 5);
+    let (observation, truth, motion) = &path.frames[0];
+    let variance = |mve: f64, pairs: usize| mve / pairs as f64;
+    let estimator =
+        SequentialEstimator::paper(presets::hybrid(), FusionMethod::LastEstimate, truth);
+    let mut estimator =
+        (estimator.expect("valid").with_score(Fixed(0.25))).with_covariance(move |outcome, mve| {
+            Matrix6::identity() * variance(mve.expect("a score"), outcome.n_pairs())
+        });
+    let step = estimator.step(&path.model, observation, motion);
+    assert_eq!(step.mve, Some(0.25));
+    let expected = Matrix6::identity() * variance(0.25, step.outcome.n_pairs());
+    assert_eq!(step.covariance, Some(expected));
+    // A score that is not an MVE is refused.
+    let mut estimator = estimator.with_score(Fixed(1.5));
+    let step = estimator.step(&path.model, observation, motion);
+    assert!(matches!(step.event, SequentialEvent::Refused(_)));
 }
 
 #[test]
