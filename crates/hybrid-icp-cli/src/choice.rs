@@ -2,14 +2,28 @@
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::OnceLock;
 
 use clap::Args;
 use hybrid_icp::core::UnknownName;
-use hybrid_icp::pipeline::PipelineFile;
+use hybrid_icp::pipeline::{Catalog, PipelineFile};
 use hybrid_icp::{BoxedStage, Preset, Refiner};
 
 use crate::limits::pipeline_limits;
 use crate::terminal::warn;
+
+static PARTS: OnceLock<Catalog> = OnceLock::new();
+
+/// Sets the parts of this run of the program.
+pub(crate) fn choose_parts(catalog: Catalog) {
+    // As for limits, the first run decides.
+    let _ = PARTS.set(catalog);
+}
+
+/// Returns the parts that a pipeline file can name.
+pub(crate) fn parts() -> &'static Catalog {
+    PARTS.get().unwrap_or_else(|| Catalog::built_in())
+}
 
 /// The options that choose a pipeline.
 #[derive(Clone, Debug, Args)]
@@ -143,7 +157,7 @@ impl Pipeline {
             file.set(assignment)?;
             name = format!("{name} {assignment}");
         }
-        file.build_within(&pipeline_limits())?;
+        file.build_from(parts(), &pipeline_limits())?;
         Ok(Self {
             name,
             toml,
@@ -160,7 +174,7 @@ impl Pipeline {
 
     /// Creates the stage alone.
     pub(crate) fn stage(&self) -> BoxedStage {
-        let build = || self.file.build_within(&pipeline_limits());
+        let build = || self.file.build_from(parts(), &pipeline_limits());
         // Building is pure, and it worked before.
         let built = || build().unwrap_or_else(|error| unreachable!("{error}"));
         self.preset.map_or_else(built, |preset| preset.build())

@@ -7,6 +7,8 @@
 //! assert_eq!(hybrid_icp_cli::run(["hybrid-icp", "pipelines"]), 0);
 //! ```
 //!
+//! [`run_with`] is the same program with custom parts for pipeline files.
+//!
 //! Exit codes: 0 if the command succeeded, 1 if something failed, 2 if the command line is wrong,
 //! 130 if the program was interrupted. A message names the cause of a failure.
 
@@ -29,6 +31,7 @@ mod terminal;
 use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
+use hybrid_icp::pipeline::Catalog;
 
 /// Refine 6D object poses in depth images.
 ///
@@ -95,11 +98,58 @@ pub fn run<I>(words: I) -> u8
 where
     I: IntoIterator<Item: Into<OsString> + Clone>,
 {
+    run_with(Catalog::built_in().clone(), words)
+}
+
+/// Runs the program with the parts of a catalog for pipeline files, which may include custom ones.
+///
+/// All commands with `--pipeline` accept them, and `pipelines --parts` lists them. The studies of
+/// `experiment` build from the parts that ship. The catalog of the first call in a process stays.
+///
+/// ```
+/// use hybrid_icp::association::OutlierFilter;
+/// use hybrid_icp::core::{Correspondences, Iteration};
+/// use hybrid_icp::pipeline::{Catalog, range::METERS};
+///
+/// /// Keeps pairs up to a depth.
+/// struct MaxDepth(f64);
+///
+/// impl OutlierFilter for MaxDepth {
+///     fn filter(&mut self, _: &Iteration<'_>, pairs: &mut Correspondences) {
+///         pairs.retain(|pair| f64::from(pair.target.point.z) <= self.0);
+///     }
+/// }
+///
+/// let mut catalog = Catalog::built_in().clone();
+/// catalog.add_filter("max-depth", |p| {
+///     p.about = "Keeps pairs up to a depth. Cost: O(n).";
+///     Ok(MaxDepth(p.number("meters", METERS, 2.0, "largest depth")?))
+/// });
+/// # let folder = tempfile::tempdir().unwrap();
+/// # std::env::set_current_dir(&folder).unwrap();
+/// let pipeline = r#"
+/// type = "icp"
+/// selection = "visible-surface"
+/// association = "projective"
+/// filter = [{ type = "max-depth", meters = 1.5 }]
+/// metric = "point-to-plane"
+/// "#;
+/// std::fs::write("mine.toml", pipeline).unwrap();
+/// // The `main` of a program passes `std::env::args_os()`.
+/// let words = ["hybrid-icp", "demo", "--pipeline", "mine.toml"];
+/// assert_eq!(hybrid_icp_cli::run_with(catalog, words), 0);
+/// ```
+#[must_use]
+pub fn run_with<I>(catalog: Catalog, words: I) -> u8
+where
+    I: IntoIterator<Item: Into<OsString> + Clone>,
+{
     let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
         Err(message) => return show(&message),
     };
     cli.limits.choose();
+    choice::choose_parts(catalog);
     interrupt::listen();
     let result = match cli.command {
         Command::Demo(arguments) => demo::run(&arguments),

@@ -2,8 +2,8 @@
 
 use clap::Args;
 use hybrid_icp::Preset;
-use hybrid_icp::pipeline::Catalog;
 
+use crate::choice::parts;
 use crate::terminal::{say, table};
 
 /// List the pipelines, print one as a TOML file, or print the catalog of parts.
@@ -23,7 +23,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return say(preset.toml());
     }
     if arguments.parts {
-        return say(Catalog::built_in().page());
+        return say(parts().page());
     }
     let rows = Preset::ALL.iter();
     let rows = rows.map(|preset| [preset.name().to_owned(), preset.summary().to_owned()]);
