@@ -39,6 +39,15 @@ impl<'a> Source<'a> {
             Self::Cloud(cloud) => cloud.diameter(),
         }
     }
+
+    /// Values derived from the model or the cloud.
+    #[must_use]
+    pub fn derived(&self) -> &'a Derived {
+        match self {
+            Self::Model(model) => model.derived(),
+            Self::Cloud(cloud) => cloud.derived(),
+        }
+    }
 }
 
 /// The side of a registration that stands still.

@@ -10,7 +10,7 @@ use crate::search::point_tree::PointTree;
 ///
 /// It is the tree of [`NearestNeighbor`](crate::NearestNeighbor). Points that are not finite are
 /// never found. Of equally near points, the first is found. Share it between threads and runs in
-/// the `derived()` cache of a model, cloud or observation.
+/// the `derived()` cache of a model, cloud or observation; its key tells point sets apart.
 ///
 /// It also leads from a pair to data per point, such as labels or colors. A pair holds the moved
 /// point, which a selection may have copied or rendered, so search at its place in the object:
@@ -20,8 +20,7 @@ use crate::search::point_tree::PointTree;
 /// use hicp_association::{OutlierFilter, PointSearch};
 /// use hicp_core::{Correspondences, Iteration, RigidTransform};
 ///
-/// /// Keeps the pairs of equal labels. Labels belong to the samples of the model and to the pixels
-/// /// of the observation's region.
+/// /// Keeps the pairs of equal labels, one per surfel of the source and of the target.
 /// struct SameLabel {
 ///     source: Vec<u8>,
 ///     target: Vec<u8>,
@@ -29,14 +28,14 @@ use crate::search::point_tree::PointTree;
 ///
 /// impl OutlierFilter for SameLabel {
 ///     fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
-///         let Some(model) = iteration.problem.model() else { return };
-///         let search: Arc<PointSearch> = model.derived().get_or_build(0, || {
-///             PointSearch::new(model.samples().iter().map(|sample| sample.point))
+///         let Some(source) = iteration.problem.source() else { return };
+///         let search: Arc<PointSearch> = source.derived().get_or_build(0, || {
+///             PointSearch::new(source.surfels().iter().map(|surfel| surfel.point))
 ///         });
 ///         let object_from_camera = RigidTransform::new(&pairs.camera_from_object().inverse());
 ///         pairs.retain(|pair| {
-///             let sample = search.nearest(&object_from_camera.point(&pair.source.point));
-///             let source = sample.and_then(|sample| self.source.get(sample.element as usize));
+///             let surfel = search.nearest(&object_from_camera.point(&pair.source.point));
+///             let source = surfel.and_then(|surfel| self.source.get(surfel.element as usize));
 ///             source.is_some() && source == self.target.get(pair.target_index as usize)
 ///         });
 ///     }
