@@ -39,6 +39,9 @@
 //! # let _ = refiner;
 //! ```
 //!
+//! Parts with scratch memory have private fields, so `..Default::default()` does not complete them.
+//! Create them with `new` or `default` and set their public fields.
+//!
 //! # Parts by role
 //!
 //! Every role is a trait. The last column names the example to copy for a custom part, in the

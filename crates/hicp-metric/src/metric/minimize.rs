@@ -21,6 +21,66 @@ use crate::system::normal_equations::NormalEquations;
 /// It is pure: equal iterations and pairs give equal results, and `&mut self` is scratch. A metric
 /// that depends on the pose reads it from [`Correspondences::camera_from_object`]. The index of the
 /// iteration and the initial pose of the stage are in [`Iteration`].
+///
+/// If the error of one pair depends on them, create an [`ErrorMetric`] for the pairs at hand:
+///
+/// ```
+/// use hicp_core::{Correspondences, Iteration, Matrix3, Pair, Vector3};
+/// use hicp_metric::{ErrorMetric, Minimize, NormalEquations};
+///
+/// /// The distance from target to source, in standard deviations of each point of the source.
+/// ///
+/// /// It holds roots of their information in the frame of the source: Σ⁻¹ = WᵀW.
+/// struct Whitened(Vec<Matrix3<f64>>);
+///
+/// /// The same at a pose.
+/// struct WhitenedAt<'a> {
+///     roots: &'a [Matrix3<f64>],
+///     source_from_target: Matrix3<f64>,
+/// }
+///
+/// impl ErrorMetric for WhitenedAt<'_> {
+///     fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+///         let (p, c) = (pair.source.point.cast::<f64>(), pair.target.point.cast::<f64>());
+///         let root = self.roots[pair.source_index as usize] * self.source_from_target;
+///         for row in root.row_iter() {
+///             let direction: Vector3<f64> = row.transpose();
+///             system.add_row(&p, &direction, direction.dot(&(p - c)), f64::from(pair.weight));
+///         }
+///     }
+/// }
+///
+/// impl Whitened {
+///     fn at(&self, pairs: &Correspondences) -> WhitenedAt<'_> {
+///         let rotation = pairs.camera_from_object().rotation.inverse();
+///         WhitenedAt { roots: &self.0, source_from_target: *rotation.to_rotation_matrix().matrix() }
+///     }
+/// }
+///
+/// impl Minimize for Whitened {
+///     fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+///         None
+///     }
+///     fn system(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<NormalEquations> {
+///         self.at(pairs).linearize_all(pairs)
+///     }
+///     fn mean_loss(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+///         self.at(pairs).mean_squared_error(pairs)
+///     }
+///     fn add_squared_errors(
+///         &mut self,
+///         iteration: &Iteration<'_>,
+///         pairs: &Correspondences,
+///         factor: f64,
+///         errors: &mut [f64],
+///     ) {
+///         self.at(pairs).add_squared_errors(iteration, pairs, factor, errors);
+///     }
+///     fn label(&self) -> &'static str {
+///         "whitened"
+///     }
+/// }
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an error metric",
     label = "this must implement `ErrorMetric` (or `Minimize`)",
