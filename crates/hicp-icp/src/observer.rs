@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use hicp_core::Isometry3;
 use hicp_core::internal::for_tuples;
+use hicp_core::{Correspondences, Isometry3};
 
 use crate::outcome::{Evaluation, Outcome};
 
@@ -115,6 +115,8 @@ pub struct IterationEvent<'a> {
     pub evaluation: Evaluation,
     /// The increment computed at this pose.
     pub increment: &'a Isometry3<f64>,
+    /// The pairs at this pose, after filtering; `None` if a custom stage does not set them.
+    pub pairs: Option<&'a Correspondences>,
 }
 
 impl<'a> IterationEvent<'a> {
@@ -131,6 +133,7 @@ impl<'a> IterationEvent<'a> {
             camera_from_object,
             evaluation,
             increment,
+            pairs: None,
         }
     }
 }

@@ -1,6 +1,8 @@
 //! The laws of stop rules.
 
-use hybrid_icp::core::{Isometry3, Iteration, Problem, Vector3, Vector6, se3};
+use hybrid_icp::core::{
+    Correspondences, Isometry3, Iteration, Pair, Point3, Problem, Surfel, Vector3, Vector6, se3,
+};
 use hybrid_icp::icp::{Evaluation, Judgment, Progress, StopRule};
 
 use crate::law::{BOXED, PURE, Subject};
@@ -81,12 +83,24 @@ fn verdicts(rule: &mut dyn StopRule, course: &Course, limit: usize) -> Vec<Judgm
     let mut previous = None;
     for (index, current) in course.iterations.iter().enumerate().take(limit) {
         let next = course.iterations.get(index + 1).unwrap_or(current).2;
+        let surfel = Surfel {
+            point: Point3::new(0.0, 0.0, 0.6),
+            normal: -Vector3::z_axis(),
+        };
+        let mut pairs = Correspondences::new();
+        pairs.begin(&current.2, first.0);
+        pairs.extend(
+            (0..)
+                .map(|i| Pair::new(i, surfel, i, surfel))
+                .take(current.0),
+        );
         let progress = Progress {
             current: evaluation(current),
             first: evaluation(first),
             previous,
             camera_from_object: &current.2,
             increment: &(next * current.2.inverse()),
+            pairs: &pairs,
         };
         let iteration = Iteration::new(index, &first.2, Problem::default());
         verdicts.push(rule.check(&iteration, &progress));

@@ -122,6 +122,7 @@ where
                 camera_from_object: &candidate,
                 evaluation: current,
                 increment: &step.increment,
+                pairs: Some(pairs),
             });
             let progress = Progress {
                 current,
@@ -129,6 +130,7 @@ where
                 previous: accepted.map(|a| a.evaluation),
                 camera_from_object: &candidate,
                 increment: &step.increment,
+                pairs,
             };
             let judgment = self.stop.check(&iteration, &progress);
             // Deviation: last increment: §III-A, Algorithm 1, applies the increment of its last

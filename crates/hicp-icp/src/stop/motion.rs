@@ -178,6 +178,7 @@ mod tests {
                 previous: None,
                 camera_from_object: pose,
                 increment,
+                pairs: &hicp_core::Correspondences::new(),
             },
         )
     }

@@ -1,7 +1,7 @@
 //! The trait of stop rules, and their combination.
 
 use hicp_core::internal::{for_tuples, type_label};
-use hicp_core::{Isometry3, Iteration};
+use hicp_core::{Correspondences, Isometry3, Iteration};
 
 use crate::outcome::{Evaluation, Termination};
 
@@ -18,6 +18,8 @@ pub struct Progress<'a> {
     pub camera_from_object: &'a Isometry3<f64>,
     /// The increment that the next iteration would apply.
     pub increment: &'a Isometry3<f64>,
+    /// The pairs at the pose just evaluated, after filtering.
+    pub pairs: &'a Correspondences,
 }
 
 /// The decision of a stop rule about the pose just evaluated.

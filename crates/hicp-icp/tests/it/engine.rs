@@ -1,13 +1,15 @@
 //! Tests of the engine of Algorithm 1 with scripted components: its poses and its reports.
 
+use std::ops::ControlFlow;
+
 use crate::script::support::{bits, pose};
 use crate::script::{Line, Log, returned, run, run_observed, scripted};
 use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair};
 use hicp_icp::Judgment;
 use hicp_icp::{
-    Convergence, Divergence, Evaluation, Icp, IterationLimit, Progress, Stage, StopRule,
-    Termination, Verdict,
+    Convergence, Divergence, Evaluation, Icp, IterationEvent, IterationLimit, Observer, Progress,
+    Stage, StopRule, Termination, Verdict,
 };
 use hicp_metric::{ErrorMetric, NormalEquations, Step};
 
@@ -317,6 +319,26 @@ fn the_observer_receives_every_evaluation_and_the_end() {
     );
 }
 
+/// Stores the number of pairs of each event.
+#[derive(Default)]
+struct PairCounts(Vec<Option<usize>>);
+
+impl Observer for PairCounts {
+    fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
+        self.0.push(event.pairs.map(Correspondences::len));
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn the_observer_receives_the_pairs() {
+    let mut counts = PairCounts::default();
+    let lines = [(100, Some(3.0)), (90, Some(2.0))];
+    let mut stage = scripted(&lines, IterationLimit(2));
+    run_observed(&mut stage, &Isometry3::identity(), &mut counts);
+    assert_eq!(counts.0, [Some(100), Some(90)]);
+}
+
 /// A rule that checks its arguments.
 struct Checking;
 
@@ -333,6 +355,9 @@ impl StopRule for Checking {
         assert_eq!(progress.camera_from_object.translation.vector.x, i as f64);
         assert_eq!(iteration.init.translation.vector.x, 0.0);
         assert_eq!(progress.increment.translation.vector.x, 1.0);
+        assert_eq!(progress.pairs.len(), at(i).n_pairs);
+        let pose = progress.pairs.camera_from_object();
+        assert_eq!(pose, progress.camera_from_object);
         Judgment::Continue
     }
 }
