@@ -34,6 +34,7 @@ mod error;
 mod format;
 #[cfg(feature = "npy")]
 mod npy;
+mod number;
 
 mod limits;
 pub use limits::ReadLimits;

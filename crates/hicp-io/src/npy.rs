@@ -14,16 +14,16 @@ use rawzip::{CompressionMethod, ZipArchive};
 use crate::error::{IoError, Place, quote};
 use crate::format::Format;
 use crate::limits::ReadLimits;
-
-/// The type of a number: kind (`f`, `i`, `u` or `b`) and size in bytes.
-type Kind = (u8, usize);
+use crate::number::{Kind, NumberType};
 
 /// An array of numbers.
 #[derive(Debug)]
 pub(crate) struct Array<'a> {
     /// The lengths of its axes.
     pub(crate) shape: Vec<usize>,
-    kind: Kind,
+    number: NumberType,
+    /// Whether the numbers are truth values.
+    is_bool: bool,
     big_endian: bool,
     /// Whether the first index varies fastest.
     by_columns: bool,
@@ -48,10 +48,10 @@ impl<'a> Array<'a> {
 
     /// Returns the bits of an integer, or `None` for floating point. A truth value has 1.
     pub(crate) fn integer_bits(&self) -> Option<u32> {
-        match self.kind {
-            (b'f', _) => None,
-            (b'b', _) => Some(1),
-            (_, bytes) => u32::try_from(8 * bytes).ok(),
+        match self.number.kind {
+            Kind::Float => None,
+            _ if self.is_bool => Some(1),
+            _ => u32::try_from(8 * self.number.bytes).ok(),
         }
     }
 
@@ -62,7 +62,7 @@ impl<'a> Array<'a> {
 
     /// Returns the numbers, with the last index varying fastest.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> {
-        let (kind, bytes) = self.kind;
+        let bytes = self.number.bytes;
         let rows = self.shape.first().copied().unwrap_or(1).max(1);
         let count = self.data.len() / bytes;
         let columns = count / rows;
@@ -71,29 +71,11 @@ impl<'a> Array<'a> {
                 true => index % columns * rows + index / columns,
                 false => index,
             };
-            let mut number = [0; 8];
-            number[..bytes].copy_from_slice(&self.data[index * bytes..][..bytes]);
-            if self.big_endian {
-                number[..bytes].reverse();
-            }
-            decode(kind, bytes, number)
+            let number = self
+                .number
+                .read(&self.data[index * bytes..], self.big_endian);
+            number.unwrap_or(f64::NAN)
         })
-    }
-}
-
-/// Converts little-endian bytes to a number.
-fn decode(kind: u8, bytes: usize, number: [u8; 8]) -> f64 {
-    let [a, b, c, d, ..] = number;
-    let unsigned = u64::from_le_bytes(number);
-    match (kind, bytes) {
-        (b'f', 2) => half::f16::from_le_bytes([a, b]).to_f64(),
-        (b'f', 4) => f32::from_le_bytes([a, b, c, d]).into(),
-        (b'f', _) => f64::from_le_bytes(number),
-        (b'i', 1) => i8::from_le_bytes([a]).into(),
-        (b'i', 2) => i16::from_le_bytes([a, b]).into(),
-        (b'i', 4) => i32::from_le_bytes([a, b, c, d]).into(),
-        (b'i', _) => i64::from_le_bytes(number) as f64,
-        _ => unsigned as f64,
     }
 }
 
@@ -129,7 +111,7 @@ fn parse_npy<'a>(path: &Path, content: Cow<'a, [u8]>) -> Result<Array<'a>, IoErr
             expected,
         ));
     }
-    let kind = kind(descr).ok_or_else(|| {
+    let number = number_type(descr).ok_or_else(|| {
         refuse(
             format!("the type {}", quote(descr)),
             "real numbers of 1, 2, 4 or 8 bytes",
@@ -158,7 +140,7 @@ fn parse_npy<'a>(path: &Path, content: Cow<'a, [u8]>) -> Result<Array<'a>, IoErr
         .iter()
         .try_fold(1_usize, |product, length| product.checked_mul(*length));
     let needed = count
-        .and_then(|count| count.checked_mul(kind.1))
+        .and_then(|count| count.checked_mul(number.bytes))
         .unwrap_or(usize::MAX);
     let (available, promised) = (content.len() - end, count.unwrap_or(usize::MAX) as u64);
     let promise = (promised, "numbers");
@@ -179,7 +161,8 @@ fn parse_npy<'a>(path: &Path, content: Cow<'a, [u8]>) -> Result<Array<'a>, IoErr
     };
     Ok(Array {
         shape,
-        kind,
+        number,
+        is_bool: descr.contains('b'),
         big_endian: descr.starts_with('>'),
         by_columns,
         data,
@@ -187,15 +170,16 @@ fn parse_npy<'a>(path: &Path, content: Cow<'a, [u8]>) -> Result<Array<'a>, IoErr
 }
 
 /// Parses a type such as `<f4`.
-fn kind(descr: &str) -> Option<Kind> {
+fn number_type(descr: &str) -> Option<NumberType> {
     let text = descr.trim_start_matches(['<', '>', '|', '=']);
     let bytes = text.get(1..)?.parse().ok()?;
-    let kind = (text.as_bytes()[0], bytes);
-    matches!(
-        kind,
-        (b'f', 2 | 4 | 8) | (b'i' | b'u', 1 | 2 | 4 | 8) | (b'b', 1)
-    )
-    .then_some(kind)
+    let kind = match (text.as_bytes()[0], bytes) {
+        (b'f', 2 | 4 | 8) => Kind::Float,
+        (b'i', 1 | 2 | 4 | 8) => Kind::Signed,
+        (b'u', 1 | 2 | 4 | 8) | (b'b', 1) => Kind::Unsigned,
+        _ => return None,
+    };
+    Some(NumberType { kind, bytes })
 }
 
 /// Extracts the NPY file of one array from an archive.

@@ -5,6 +5,7 @@ use super::points::{PointCloud, Points};
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::limits::Limit;
 use crate::mesh::raw::Reading;
+use crate::number::{Kind, NumberType};
 
 /// The names of the fields that are read, and other names of the normals.
 const NAMES: [[&str; 2]; 6] = [
@@ -41,11 +42,8 @@ pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, 
         line_number += 1;
         let place = Place::Line(line_number);
         let rest = content.get(at..).unwrap_or_default();
-        let Some(end) = rest
-            .iter()
-            .position(|byte| *byte == b'\n')
-            .filter(|_| at < 1 << 16)
-        else {
+        let end = rest.iter().position(|byte| *byte == b'\n');
+        let Some(end) = end.filter(|_| at < 1 << 16) else {
             return Err(reading.refuse(place, END_OF_FILE, "a line `DATA` in the first 64 KiB"));
         };
         let line = String::from_utf8_lossy(&rest[..end]);
@@ -60,93 +58,73 @@ pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, 
         reading.refuse(place.clone(), "fields of unknown size", expected)
     })?;
     let fields = NAMES.map(|names| {
-        header
-            .fields
-            .iter()
-            .find(|field| names.contains(&&*field.name) && field.count > 0)
+        let mut fields = header.fields.iter();
+        fields.find(|field| names.contains(&&*field.name) && field.count > 0)
     });
     if fields[..3].iter().any(Option::is_none) {
-        let names: Vec<_> = header
-            .fields
-            .iter()
-            .take(12)
-            .map(|field| &*field.name)
-            .collect();
+        let names = header.fields.iter().take(12).map(|field| &*field.name);
+        let names: Vec<&str> = names.collect();
         return Err(reading.refuse(place, format!("the fields {names:?}"), "x, y and z"));
     }
     let count = header.points;
     reading.check(Limit::VERTICES, place.clone(), count)?;
     let mut points = Points::new(reading, fields.iter().all(Option::is_some));
     let body = &content[at..];
-    let promise = |needed: u64, available: u64| {
-        IoError::check_promise(
-            reading.path,
-            place.clone(),
-            (count as u64, "points"),
-            needed,
-            available,
-        )
+    let promise = |bytes_per_point: usize, available: u64| {
+        let needed = (count as u64).saturating_mul(bytes_per_point as u64);
+        let promised = (count as u64, "points");
+        IoError::check_promise(reading.path, place.clone(), promised, needed, available)
     };
-    let needed = (count as u64).saturating_mul(stride as u64);
     match &*header.data {
         "ascii" => {
-            promise(
-                (count as u64).saturating_mul(2 * numbers as u64),
-                body.len() as u64 + 1,
-            )?;
+            // The last number may have no separator after it.
+            promise(numbers.saturating_mul(2), body.len() as u64 + 1)?;
             let text = String::from_utf8_lossy(body);
-            let mut lines = text
-                .lines()
-                .zip(line_number + 1..)
-                .filter(|(line, _)| !line.trim().is_empty());
+            let lines = text.lines().zip(line_number + 1..);
+            let mut lines = lines.filter(|(line, _)| !line.trim().is_empty());
             for index in 0..count {
                 let (line, number) = lines.next().unwrap_or(("", line_number + 1 + index));
                 let words: Vec<&str> = line.split_whitespace().collect();
                 let values = fields.map(|field| match field {
-                    Some(field) => words
-                        .get(field.first_number)
-                        .and_then(|word| word.parse().ok()),
+                    Some(field) => words.get(field.first_number)?.parse().ok(),
                     None => Some(f64::NAN),
                 });
-                if values.contains(&None) {
+                let [Some(x), Some(y), Some(z), Some(nx), Some(ny), Some(nz)] = values else {
                     let expected = format!("{numbers} numbers of point {index} of {count}");
                     return Err(reading.refuse(Place::Line(number), quote(line), expected));
-                }
-                points.add(
-                    Place::Line(number),
-                    &values.map(|value| value.unwrap_or(f64::NAN)),
-                )?;
+                };
+                points.add(Place::Line(number), &[x, y, z, nx, ny, nz])?;
             }
         }
         "binary" => {
-            promise(needed, body.len() as u64)?;
-            for (index, point) in body.chunks_exact(stride.max(1)).take(count).enumerate() {
-                let values = fields.map(|field| {
-                    field.map_or(f64::NAN, |field| field.number(&point[field.first_byte..]))
-                });
-                points.add(Place::Byte((at + index * stride) as u64), &values)?;
+            promise(stride, body.len() as u64)?;
+            for index in 0..count {
+                let start = index * stride;
+                let values = numbers_of(fields, |field| &body[start + field.first_byte..]);
+                points.add(Place::Byte((at + start) as u64), &values)?;
             }
         }
         "binary_compressed" => {
-            let sizes = body.first_chunk::<8>().map(|bytes| {
-                let number = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[at + i]));
-                (number(0) as usize, number(4) as usize)
-            });
-            let packed = sizes.and_then(|(packed, _)| body[8..].get(..packed));
-            let (Some(packed), Some((_, length))) = (packed, sizes) else {
+            let size = |at: usize| {
+                let bytes = body.get(at..at + 4)?.try_into().ok()?;
+                Some(u32::from_le_bytes(bytes) as usize)
+            };
+            let packed = size(0).and_then(|packed| body.get(8..)?.get(..packed));
+            let (Some(packed), Some(length)) = (packed, size(4)) else {
                 return Err(reading.refuse(place, END_OF_FILE, "compressed data"));
             };
-            promise(needed, length as u64)?;
-            promise(length as u64 / MAX_COMPRESSION, packed.len() as u64)?;
+            promise(stride, length as u64)?;
+            let needed = length as u64 / MAX_COMPRESSION;
+            let promised = (count as u64, "points");
+            let available = packed.len() as u64;
+            IoError::check_promise(reading.path, place.clone(), promised, needed, available)?;
             let damaged = || reading.refuse(Place::Byte(at as u64), "damaged data", "LZF data");
             let data = lzf::decompress(packed, length).ok_or_else(damaged)?;
             for index in 0..count {
                 // All values of a field are together.
-                let values = fields.map(|field| {
-                    field.map_or(f64::NAN, |field| {
-                        let start = field.first_byte * count + index * field.size * field.count;
-                        field.number(&data[start..])
-                    })
+                let values = numbers_of(fields, |field| {
+                    let of_field = index * field.size * field.count;
+                    &data[field.first_byte * count + of_field..]
                 });
                 points.add(Place::Byte(at as u64), &values)?;
             }
@@ -208,7 +186,7 @@ impl Header {
         }
         let (mut bytes, mut numbers) = (0_usize, 0_usize);
         for field in &mut self.fields {
-            field.kind_is_known().then_some(())?;
+            field.number_type()?;
             (field.first_byte, field.first_number) = (bytes, numbers);
             bytes = bytes.checked_add(field.size.checked_mul(field.count)?)?;
             numbers = numbers.checked_add(field.count)?;
@@ -218,29 +196,19 @@ impl Header {
 }
 
 impl Field {
-    fn kind_is_known(&self) -> bool {
-        matches!(
-            (self.kind, self.size),
-            ('F', 4 | 8) | ('I' | 'U', 1 | 2 | 4 | 8)
-        )
+    fn number_type(&self) -> Option<NumberType> {
+        let kind = match (self.kind, self.size) {
+            ('F', 4 | 8) => Kind::Float,
+            ('I', 1 | 2 | 4 | 8) => Kind::Signed,
+            ('U', 1 | 2 | 4 | 8) => Kind::Unsigned,
+            _ => return None,
+        };
+        Some(NumberType::new(kind, self.size))
     }
+}
 
-    /// Returns the number at the start of the bytes.
-    fn number(&self, bytes: &[u8]) -> f64 {
-        let mut number = [0; 8];
-        number
-            .iter_mut()
-            .zip(&bytes[..self.size.min(bytes.len())])
-            .for_each(|(to, from)| *to = *from);
-        let [a, b, c, d, ..] = number;
-        match (self.kind, self.size) {
-            ('F', 4) => f32::from_le_bytes([a, b, c, d]).into(),
-            ('F', _) => f64::from_le_bytes(number),
-            ('I', 1) => i8::from_le_bytes([a]).into(),
-            ('I', 2) => i16::from_le_bytes([a, b]).into(),
-            ('I', 4) => i32::from_le_bytes([a, b, c, d]).into(),
-            ('I', _) => i64::from_le_bytes(number) as f64,
-            _ => u64::from_le_bytes(number) as f64,
-        }
-    }
+/// Returns the first number of each field, which starts at `bytes`; NaN without a field.
+fn numbers_of<'a>(fields: [Option<&Field>; 6], bytes: impl Fn(&Field) -> &'a [u8]) -> [f64; 6] {
+    let number = |field: &Field| field.number_type()?.read(bytes(field), false);
+    fields.map(|field| field.and_then(number).unwrap_or(f64::NAN))
 }

@@ -5,8 +5,13 @@ use std::path::Path;
 use super::raster::{Raster, check_size};
 use crate::error::{IoError, Place, quote};
 use crate::limits::ReadLimits;
+use crate::number::{F32, Kind, NumberType};
 
 /// Decodes a binary PGM (`P5`) or PFM (`Pf`, `PF`) image.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "samples have at most 16 bits or are f32"
+)]
 pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Raster, IoError> {
     let mut rest = &content[2..];
     let [width, height, last] = [(); 3].map(|()| word(&mut rest));
@@ -26,14 +31,13 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
         let expected = "a header of the width, the height and the largest value or the scale";
         return Err(IoError::new(path, Place::Byte(2), start, expected));
     };
-    let bytes = if float {
-        4
-    } else {
-        1 + u64::from(last > 255.0)
+    let number = match float {
+        true => F32,
+        false => NumberType::new(Kind::Unsigned, 1 + usize::from(last > 255.0)),
     };
     let needed = width
         .saturating_mul(height)
-        .saturating_mul(bytes * channels as u64);
+        .saturating_mul((number.bytes * channels) as u64);
     let size = check_size(limits, (path, 0), (width, height), needed, u64::MAX)?;
     // A single white space ends the header.
     let body = rest.get(1..).unwrap_or_default();
@@ -41,26 +45,18 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
     IoError::check_promise(path, Place::Byte(2), (count, "pixels"), needed, available)?;
     // The product is at most the size of the file.
     let body = &body[..usize::try_from(needed).unwrap_or(0)];
-    let samples = match (float, bytes) {
-        (true, _) => {
-            let sample = |b: &[u8]| match last < 0.0 {
-                true => f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
-                false => f32::from_be_bytes([b[0], b[1], b[2], b[3]]),
-            };
-            // The last row comes first.
-            let rows = body.chunks_exact(4 * size.0 as usize * channels).rev();
-            rows.flat_map(|row| row.chunks_exact(4).map(sample))
-                .collect()
-        }
-        (false, 1) => body.iter().map(|byte| f32::from(*byte)).collect(),
-        _ => {
-            let pairs = body.chunks_exact(2);
-            pairs
-                .map(|b| f32::from(u16::from_be_bytes([b[0], b[1]])))
-                .collect()
-        }
-    };
-    let integer_bits = (!float).then_some(if bytes == 1 { 8 } else { 16 });
+    // A negative scale of a PFM image means that the numbers are little-endian.
+    let big_endian = !float || last > 0.0;
+    let sample = |bytes: &[u8]| number.read(bytes, big_endian).unwrap_or(f64::NAN) as f32;
+    let rows = body.chunks_exact(number.bytes * size.0 as usize * channels);
+    let mut rows: Vec<_> = rows.collect();
+    if float {
+        // The last row comes first.
+        rows.reverse();
+    }
+    let samples = rows.iter().flat_map(|row| row.chunks_exact(number.bytes));
+    let samples = samples.map(sample).collect();
+    let integer_bits = (!float).then_some(if number.bytes == 1 { 8 } else { 16 });
     Ok(Raster {
         channels,
         ..Raster::gray(size, integer_bits, samples)

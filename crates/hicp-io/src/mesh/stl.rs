@@ -11,6 +11,7 @@ use super::lines::Lines;
 use super::raw::{FACE, RawMesh, Reading};
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::limits::Limit;
+use crate::number::F32;
 use crate::source::text_bytes;
 
 const HEADER_BYTES: usize = 84;
@@ -97,10 +98,8 @@ fn parse_binary<'a>(reading: Reading<'a>, content: &[u8]) -> Result<RawMesh<'a>,
         let mut corners = [0; 3];
         // The normal comes first.
         for (offset, index) in [12, 24, 36].into_iter().zip(&mut corners) {
-            let position = [0, 4, 8].map(|axis| {
-                let bytes = &triangle[offset + axis..];
-                f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
-            });
+            let coordinate = |axis| F32.read(&triangle[offset + axis..], false);
+            let position = [0, 4, 8].map(|axis| coordinate(axis).unwrap_or(f64::NAN));
             let place = Place::Byte((start + offset) as u64);
             *index = mesh.weld(place, position)?;
         }

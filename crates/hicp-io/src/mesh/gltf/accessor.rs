@@ -6,6 +6,7 @@ use super::schema::{Root, SparsePart};
 use crate::error::{IoError, Place, quote};
 use crate::limits::Limit;
 use crate::mesh::raw::Reading;
+use crate::number::{Kind, NumberType};
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Accessors<'a, 'r> {
@@ -120,10 +121,10 @@ impl Accessors<'_, '_> {
             let expected = "a file without meshopt compression: gltf-transform copy writes one";
             return refuse(format!("meshopt compression ({name})"), expected);
         }
-        let Some(size) = component_bytes(layout.kind) else {
+        let Some((number, largest)) = component(layout.kind) else {
             return refuse(format!("component type {}", layout.kind), "5120 to 5126");
         };
-        let element = size * layout.components;
+        let element = number.bytes * layout.components;
         let stride = found.byte_stride.unwrap_or(element);
         let end = found.byte_offset.checked_add(found.byte_length);
         let bytes = self.buffers.get(found.buffer);
@@ -145,37 +146,28 @@ impl Accessors<'_, '_> {
             );
         };
         let numbers = used.chunks(stride).flat_map(|element| {
-            let components = element.chunks_exact(size).take(layout.components);
-            components.map(|bytes| component(layout.kind, layout.normalized, bytes))
+            let components = element.chunks_exact(number.bytes).take(layout.components);
+            let numbers = components.filter_map(|bytes| number.read(bytes, false));
+            numbers.map(|number| match layout.normalized {
+                // Normalized integers are from -1 to 1.
+                true => (number / largest).max(-1.0),
+                false => number,
+            })
         });
         Ok(numbers.collect())
     }
 }
 
-/// Returns the size of a component of a type, in bytes.
-fn component_bytes(kind: u32) -> Option<usize> {
-    match kind {
-        5120 | 5121 => Some(1),
-        5122 | 5123 => Some(2),
-        5125 | 5126 => Some(4),
-        _ => None,
-    }
-}
-
-/// Converts little-endian bytes to a number; normalized integers are from -1 to 1.
-fn component(kind: u32, normalized: bool, bytes: &[u8]) -> f64 {
-    let (number, largest) = match (kind, bytes) {
-        (5120, [a]) => (f64::from(i8::from_le_bytes([*a])), 127.0),
-        (5121, [a]) => (f64::from(*a), 255.0),
-        (5122, [a, b]) => (f64::from(i16::from_le_bytes([*a, *b])), 32767.0),
-        (5123, [a, b]) => (f64::from(u16::from_le_bytes([*a, *b])), 65535.0),
-        (5125, [a, b, c, d]) => (f64::from(u32::from_le_bytes([*a, *b, *c, *d])), 1.0),
-        (_, [a, b, c, d]) => (f64::from(f32::from_le_bytes([*a, *b, *c, *d])), 1.0),
-        _ => (f64::NAN, 1.0),
+/// Returns the type of a component, and the largest value of a normalized one.
+fn component(kind: u32) -> Option<(NumberType, f64)> {
+    let (kind, bytes, largest) = match kind {
+        5120 => (Kind::Signed, 1, 127.0),
+        5121 => (Kind::Unsigned, 1, 255.0),
+        5122 => (Kind::Signed, 2, 32767.0),
+        5123 => (Kind::Unsigned, 2, 65535.0),
+        5125 => (Kind::Unsigned, 4, 1.0),
+        5126 => (Kind::Float, 4, 1.0),
+        _ => return None,
     };
-    if normalized {
-        (number / largest).max(-1.0)
-    } else {
-        number
-    }
+    Some((NumberType { kind, bytes }, largest))
 }

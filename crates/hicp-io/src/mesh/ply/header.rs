@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::error::{END_OF_FILE, IoError, Place, quote};
+use crate::number::{Kind, NumberType};
 use crate::source::text_bytes;
 
 /// The largest accepted size of a header, in bytes.
@@ -41,45 +42,20 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-/// A type of number in a PLY file.
-#[derive(Debug)]
-pub(super) struct Scalar {
-    /// The two names of the type, separated by a space.
-    names: &'static str,
-    pub(super) bytes: usize,
-    /// Converts the first bytes, in little-endian order, to a number.
-    pub(super) number: fn([u8; 8]) -> f64,
-}
-
-const fn scalar(names: &'static str, bytes: usize, number: fn([u8; 8]) -> f64) -> Scalar {
-    Scalar {
-        names,
-        bytes,
-        number,
-    }
-}
-
-fn first<const N: usize>(bytes: [u8; 8]) -> [u8; N] {
-    std::array::from_fn(|index| bytes[index])
-}
-
-static SCALARS: [Scalar; 8] = [
-    scalar("char int8", 1, |b| i8::from_le_bytes(first(b)).into()),
-    scalar("uchar uint8", 1, |b| u8::from_le_bytes(first(b)).into()),
-    scalar("short int16", 2, |b| i16::from_le_bytes(first(b)).into()),
-    scalar("ushort uint16", 2, |b| u16::from_le_bytes(first(b)).into()),
-    scalar("int int32", 4, |b| i32::from_le_bytes(first(b)).into()),
-    scalar("uint uint32", 4, |b| u32::from_le_bytes(first(b)).into()),
-    scalar("float float32", 4, |b| f32::from_le_bytes(first(b)).into()),
-    scalar("double float64", 8, f64::from_le_bytes),
-];
-
-impl Scalar {
-    fn parse(name: &str) -> Result<&'static Self, String> {
-        let mut scalars = SCALARS.iter();
-        let scalar = scalars.find(|scalar| scalar.names.split(' ').any(|known| known == name));
-        scalar.ok_or_else(grammar)
-    }
+/// Returns the type of numbers of a name.
+fn number_type(name: &str) -> Result<NumberType, String> {
+    let (kind, bytes) = match name {
+        "char" | "int8" => (Kind::Signed, 1),
+        "uchar" | "uint8" => (Kind::Unsigned, 1),
+        "short" | "int16" => (Kind::Signed, 2),
+        "ushort" | "uint16" => (Kind::Unsigned, 2),
+        "int" | "int32" => (Kind::Signed, 4),
+        "uint" | "uint32" => (Kind::Unsigned, 4),
+        "float" | "float32" => (Kind::Float, 4),
+        "double" | "float64" => (Kind::Float, 8),
+        _ => return Err(grammar()),
+    };
+    Ok(NumberType { kind, bytes })
 }
 
 /// A value that each element of a kind has: a number or a list of numbers.
@@ -87,8 +63,8 @@ impl Scalar {
 pub(super) struct Property {
     pub(super) name: String,
     /// The type of the length of a list; `None` if the property is a single number.
-    pub(super) count: Option<&'static Scalar>,
-    pub(super) scalar: &'static Scalar,
+    pub(super) count: Option<NumberType>,
+    pub(super) scalar: NumberType,
     /// The position at which a reader stores the values.
     ///
     /// It is 0 to 5 for [`VERTEX_NAMES`], the next numbers are for [`OPTIONAL_NAMES`]. It is 0 for
@@ -258,7 +234,7 @@ fn declare(
         [] | ["ply" | "comment" | "obj_info", ..] | ["end_header"] => return Ok(()),
         _ => return Err(grammar()),
     };
-    let count = count.map(Scalar::parse).transpose()?;
+    let count = count.map(number_type).transpose()?;
     let element = elements.last_mut().ok_or_else(grammar)?;
     let slot = match (&*element.name, name, count) {
         ("vertex", _, None) => {
@@ -294,7 +270,7 @@ fn declare(
     element.properties.push(Property {
         name: name.to_owned(),
         count,
-        scalar: Scalar::parse(scalar)?,
+        scalar: number_type(scalar)?,
         slot,
         is_optional,
         line,

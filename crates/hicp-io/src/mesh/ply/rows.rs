@@ -3,10 +3,11 @@
 use std::ops::Range;
 use std::str::SplitAsciiWhitespace;
 
-use super::header::{Element, Encoding, Header, Property, Scalar};
+use super::header::{Element, Encoding, Header, Property};
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 use crate::mesh::lines::Lines;
 use crate::mesh::raw::Reading;
+use crate::number::NumberType;
 
 /// The part of a file that is not read yet.
 #[derive(Clone)]
@@ -117,7 +118,7 @@ impl<'a> Rows<'a> {
         Some(())
     }
 
-    fn number(&mut self, scalar: &Scalar, kept: bool, optional: bool) -> Option<f64> {
+    fn number(&mut self, scalar: NumberType, kept: bool, optional: bool) -> Option<f64> {
         match self {
             Self::Ascii { words, .. } => {
                 let word = words.next()?;
@@ -131,14 +132,9 @@ impl<'a> Rows<'a> {
             Self::Binary {
                 rest, big_endian, ..
             } => {
-                let (bytes, others) = rest.split_at_checked(scalar.bytes)?;
-                *rest = others;
-                let mut little = [0; 8];
-                little[..bytes.len()].copy_from_slice(bytes);
-                if *big_endian {
-                    little[..bytes.len()].reverse();
-                }
-                Some((scalar.number)(little))
+                let number = scalar.read(rest, *big_endian)?;
+                *rest = &rest[scalar.bytes..];
+                Some(number)
             }
         }
     }
