@@ -44,3 +44,26 @@ impl NumberType {
         })
     }
 }
+
+/// Rounds to `f32`, the precision of buffers.
+#[allow(clippy::cast_possible_truncation, reason = "rounds")]
+pub(crate) fn narrow(number: f64) -> f32 {
+    number as f32
+}
+
+/// Drops the fraction of a number. The nearest integer in range replaces one out of range, and 0
+/// replaces NaN.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates"
+)]
+pub(crate) fn whole(number: f64) -> u32 {
+    number as u32
+}
+
+/// Rounds to a byte. The nearest byte replaces a number out of range, and 0 replaces NaN.
+pub(crate) fn byte(number: f64) -> u8 {
+    let [.., byte] = whole(number.round().min(255.0)).to_be_bytes();
+    byte
+}

@@ -175,11 +175,6 @@ impl Rle {
 
     /// Returns COCO's compressed text.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "five bits fit"
-    )]
     pub fn to_compressed(&self) -> String {
         let mut text = String::new();
         for (index, count) in self.counts.iter().enumerate() {
@@ -188,7 +183,7 @@ impl Rle {
                 value -= i64::from(self.counts[index - 2]);
             }
             loop {
-                let bits = (value & 0x1f) as u8;
+                let [bits, ..] = (value & 0x1f).to_le_bytes();
                 value >>= 5;
                 // The sign of the last five bits must be that of the number.
                 let done = value == if bits & 0x10 == 0 { 0 } else { -1 };

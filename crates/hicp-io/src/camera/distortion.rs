@@ -2,6 +2,8 @@
 
 use hicp_core::{ColorImage, DepthImage, Mask, PinholeCamera};
 
+use crate::number::whole;
+
 /// A lens distortion: where the ray through a point of the ideal image plane really hits the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distortion {
@@ -85,12 +87,7 @@ impl Distortion {
                 let [x, y] = self.distort(ideal);
                 let (u, v) = ((x * fx + cx).round(), (y * fy + cy).round());
                 let inside = u >= 0.0 && v >= 0.0 && u < width.into() && v < height.into();
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "inside of the image"
-                )]
-                inside.then_some((u as u32, v as u32))
+                inside.then_some((whole(u), whole(v)))
             })
         })
     }

@@ -2,6 +2,8 @@
 
 use hicp_core::{DepthImage, Isometry3, PinholeCamera, Point3};
 
+use crate::number::{narrow, whole};
+
 /// The largest side of the area of a pixel in the other image, pixels.
 const MOST_PIXELS: f64 = 64.0;
 
@@ -15,11 +17,6 @@ const MOST_PIXELS: f64 = 64.0;
 ///
 /// Cost: proportional to the pixels of both images.
 #[must_use]
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "pixels are inside of an image, and depths are f32"
-)]
 pub fn register_depth(
     depth: &DepthImage,
     from: &PinholeCamera,
@@ -39,8 +36,11 @@ pub fn register_depth(
         ([x * to.fx() + to.cx(), y * to.fy() + to.cy()], point.z)
     };
     for (index, z) in depth.pixels().iter().enumerate().filter(|(_, z)| **z > 0.0) {
-        let (u, v) = (index as u32 % depth.width(), index as u32 / depth.width());
-        let (u, v, z) = (f64::from(u), f64::from(v), f64::from(*z));
+        let (u, v) = (
+            index % depth.width() as usize,
+            index / depth.width() as usize,
+        );
+        let (u, v, z) = (u as f64, v as f64, f64::from(*z));
         let (_, depth) = project(u, v, z);
         let (a, _) = project(u - 0.5, v - 0.5, z);
         let (b, _) = project(u + 0.5, v + 0.5, z);
@@ -55,7 +55,7 @@ pub fn register_depth(
             );
             (small && last >= 0.0 && first < f64::from(side)).then(|| {
                 let last = last.min(f64::from(side) - 1.0);
-                first as u32..=last as u32
+                whole(first)..=whole(last)
             })
         };
         let (Some(columns), Some(rows)) = (span(0, width), span(1, height)) else {
@@ -67,7 +67,7 @@ pub fn register_depth(
         for row in rows {
             for column in columns.clone() {
                 let pixel = &mut nearest[row as usize * width as usize + column as usize];
-                *pixel = pixel.min(depth as f32);
+                *pixel = pixel.min(narrow(depth));
             }
         }
     }

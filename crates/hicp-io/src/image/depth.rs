@@ -10,6 +10,7 @@ use super::pixels;
 use super::raster::Raster;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
+use crate::number::{narrow, whole};
 
 /// Reads a depth image from a 16-bit gray PNG file; 0 means missing.
 ///
@@ -39,7 +40,6 @@ impl ReadLimits {
     /// # Errors
     ///
     /// As for [`read_depth_png`].
-    #[allow(clippy::cast_possible_truncation, reason = "depths are rounded to f32")]
     pub fn read_depth_png(
         &self,
         path: impl AsRef<Path>,
@@ -50,7 +50,7 @@ impl ReadLimits {
         let image = pixels::read(self, path, Transformations::IDENTITY, true)?;
         let to_meters = |bytes: &[u8]| {
             let units = u16::from_be_bytes([bytes[0], bytes[1]]);
-            (f64::from(units) * millimeters_per_unit / 1000.0) as f32
+            narrow(f64::from(units) * millimeters_per_unit / 1000.0)
         };
         let meters = image.bytes.chunks_exact(2).map(to_meters).collect();
         let depth = DepthImage::from_meters(image.width, image.height, meters);
@@ -110,7 +110,6 @@ impl RawDepth {
     /// # Errors
     ///
     /// [`IoError`] if the unit is not finite and positive, or is missing for integers.
-    #[allow(clippy::cast_possible_truncation, reason = "depths are rounded to f32")]
     pub fn scaled(self, millimeters_per_unit: Option<f64>) -> Result<DepthImage, IoError> {
         let (path, (width, height)) = (&self.path, self.size());
         let millimeters = match millimeters_per_unit {
@@ -122,7 +121,7 @@ impl RawDepth {
             }
         };
         check_scale(path, millimeters)?;
-        let meters = |units: f32| (f64::from(units) * millimeters / 1000.0) as f32;
+        let meters = |units: f32| narrow(f64::from(units) * millimeters / 1000.0);
         let depth = DepthImage::collect(width, height, self.raster.samples.into_iter().map(meters));
         depth.map_err(|error| IoError::unusable(path, "depth image", error))
     }
@@ -183,11 +182,6 @@ pub fn write_depth_png(
 }
 
 /// Returns the big-endian bytes of an image in the unit of its file.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "the range is checked"
-)]
 fn in_units(
     path: &Path,
     depth: &DepthImage,
@@ -208,7 +202,8 @@ fn in_units(
             let expected = format!("at most {limit} m at this scale");
             return Err(IoError::new(path, None, found, expected));
         }
-        bytes.extend((units as u16).to_be_bytes());
+        let [.., high, low] = whole(units).to_be_bytes();
+        bytes.extend([high, low]);
     }
     Ok(bytes)
 }

@@ -8,6 +8,7 @@ use super::decode;
 use super::raster::Raster;
 use crate::error::IoError;
 use crate::limits::ReadLimits;
+use crate::number::{narrow, whole};
 
 /// The supported formats.
 const EXPECTED: &str = "a mask as PNG, TIFF, BMP, NPY, NPZ or PGM";
@@ -67,14 +68,9 @@ impl ReadLimits {
         let image = decode::read(self, path, EXPECTED)?;
         let values = values(&image);
         let background = image.background.as_deref().unwrap_or_default();
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "an index of a palette"
-        )]
         let is_background = |value: f64| {
             background
-                .get(value as usize)
+                .get(whole(value) as usize)
                 .copied()
                 .unwrap_or(value == 0.0)
         };
@@ -140,17 +136,12 @@ fn values(image: &Raster) -> impl Iterator<Item = f64> + Clone {
 }
 
 /// Returns the value as a message shows it.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a color has 24 bits"
-)]
 fn shown(value: f64) -> String {
     match value.abs() {
         color if (MaskRule::COLOR..2.0 * MaskRule::COLOR).contains(&color) => {
-            format!("#{:06x}", (color - MaskRule::COLOR) as u32)
+            format!("#{:06x}", whole(color - MaskRule::COLOR))
         }
-        0.0 | 1e-4..1e9 => (value as f32).to_string(),
+        0.0 | 1e-4..1e9 => narrow(value).to_string(),
         _ => format!("{value:e}"),
     }
 }

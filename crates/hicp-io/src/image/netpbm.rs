@@ -5,13 +5,9 @@ use std::path::Path;
 use super::raster::{Raster, check_size};
 use crate::error::{IoError, Place, quote};
 use crate::limits::ReadLimits;
-use crate::number::{F32, Kind, NumberType};
+use crate::number::{F32, Kind, NumberType, narrow};
 
 /// Decodes a binary PGM (`P5`) or PFM (`Pf`, `PF`) image.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "samples have at most 16 bits or are f32"
-)]
 pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Raster, IoError> {
     let mut rest = &content[2..];
     let [width, height, last] = [(); 3].map(|()| word(&mut rest));
@@ -47,7 +43,7 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
     let body = &body[..usize::try_from(needed).unwrap_or(0)];
     // A negative scale of a PFM image means that the numbers are little-endian.
     let big_endian = !float || last > 0.0;
-    let sample = |bytes: &[u8]| number.read(bytes, big_endian).unwrap_or(f64::NAN) as f32;
+    let sample = |bytes: &[u8]| number.read(bytes, big_endian).map_or(f32::NAN, narrow);
     let rows = body.chunks_exact(number.bytes * size.0 as usize * channels);
     let mut rows: Vec<_> = rows.collect();
     if float {

@@ -6,15 +6,12 @@ use super::raster::{Raster, check_size};
 use crate::error::IoError;
 use crate::limits::ReadLimits;
 use crate::npy::Array;
+use crate::number::narrow;
 
 /// The names of arrays that are preferred in an NPZ archive.
 const NAMES: [&str; 5] = ["depth", "mask", "image", "data", "arr_0"];
 
 /// Decodes an array of the shape (height, width), with an optional last axis of channels.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "samples are rounded to f32"
-)]
 pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Raster, IoError> {
     let array = Array::parse(limits, path, content, &NAMES)?;
     // A single image may have an axis of length 1 in front.
@@ -32,7 +29,7 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
     };
     let (size, raw) = ((width as u64, height as u64), array.raw_bytes() as u64);
     let size = check_size(limits, (path, 0), size, raw, raw)?;
-    let samples = array.numbers().map(|number| number as f32).collect();
+    let samples = array.numbers().map(narrow).collect();
     Ok(Raster {
         channels,
         has_alpha: channels % 2 == 0,

@@ -9,12 +9,9 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use super::raster::{Raster, check_size, unpack};
 use crate::error::IoError;
 use crate::limits::ReadLimits;
+use crate::number::narrow;
 
 /// Decodes the first image of a TIFF file.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "samples are rounded to f32"
-)]
 pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Raster, IoError> {
     let failed = |error: tiff::TiffError| {
         let found = "data that are not a complete TIFF image";
@@ -63,9 +60,9 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
         DecodingResult::I64(values) => values.into_iter().map(|x| x as f32).collect(),
         DecodingResult::F16(values) => values.into_iter().map(f32::from).collect(),
         DecodingResult::F32(values) => values,
-        DecodingResult::F64(values) => values.into_iter().map(|x| x as f32).collect(),
+        DecodingResult::F64(values) => values.into_iter().map(narrow).collect(),
     };
-    let integer_bits = (!float).then_some(bits as u32);
+    let integer_bits = (!float).then_some(u32::from(color.bit_depth()));
     Ok(Raster {
         channels,
         has_alpha,

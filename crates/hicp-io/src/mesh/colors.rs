@@ -6,6 +6,7 @@ use hicp_core::{ColorImage, SurfaceColor, TexturedTriangle};
 
 use crate::error::IoError;
 use crate::limits::{Limit, ReadLimits};
+use crate::number::{byte, narrow};
 
 /// The colors of a mesh as its file states them: textures, or else those of the vertices.
 #[derive(Debug, Default)]
@@ -25,9 +26,8 @@ pub(crate) struct Colors {
 
 impl Colors {
     /// Adds the color of the next vertex.
-    #[allow(clippy::cast_possible_truncation, reason = "colors become bytes")]
     pub(super) fn add(&mut self, color: [f64; 3], bytes: bool) {
-        let color = color.map(|number| number as f32);
+        let color = color.map(narrow);
         self.bytes = bytes;
         self.largest = color.into_iter().fold(self.largest, f32::max);
         self.vertices.push(color);
@@ -107,11 +107,6 @@ impl Colors {
         (None, self.fault)
     }
 
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the conversion saturates"
-    )]
     fn vertex_colors(&self) -> SurfaceColor {
         let scale = match self.largest {
             _ if self.bytes => 1.0,
@@ -119,8 +114,8 @@ impl Colors {
             ..=255.0 => 1.0,
             _ => 255.0 / 65535.0,
         };
-        let byte = |number: f32| (number * scale).round() as u8;
-        let colors = self.vertices.iter().map(|color| color.map(byte));
+        let channel = |number: f32| byte(f64::from(number * scale));
+        let colors = self.vertices.iter().map(|color| color.map(channel));
         SurfaceColor::Vertices(colors.collect())
     }
 }

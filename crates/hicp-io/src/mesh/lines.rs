@@ -1,5 +1,7 @@
 //! Lines of text files with any line endings.
 
+use std::str::FromStr;
+
 use super::raw::Reading;
 use crate::error::{END_OF_FILE, IoError, Place, quote};
 
@@ -66,6 +68,12 @@ impl<'a> Iterator for Lines<'a> {
             .unwrap_or_default();
         Some(line)
     }
+}
+
+/// Returns the numbers at the start of a text, up to the first word that is not one.
+pub(super) fn numbers<T: FromStr>(text: &str) -> impl Iterator<Item = T> {
+    let words = text.split_whitespace();
+    words.map_while(|word| word.parse().ok())
 }
 
 /// Removes the comment of a line and the surrounding spaces.

@@ -5,10 +5,11 @@ use std::collections::HashMap;
 use hicp_core::ColorImage;
 
 use super::colors::Colors;
-use super::lines::{Lines, without_comment};
+use super::lines::{Lines, numbers, without_comment};
 use super::raw::{RawMesh, Reading};
 use super::texture;
 use crate::error::{IoError, quote};
+use crate::number::byte;
 use crate::source::{is_absent, lossy_text};
 
 /// The index of a corner without texture coordinates, and of a face without a material.
@@ -70,8 +71,8 @@ impl Materials {
         let rest = rest.trim();
         match kind {
             "vt" => {
-                let mut numbers = rest.split_whitespace().map_while(|word| word.parse().ok());
-                let s: f32 = numbers.next().unwrap_or(0.0);
+                let mut numbers = numbers::<f32>(rest);
+                let s = numbers.next().unwrap_or(0.0);
                 // The origin is the lower left corner.
                 let t = 1.0 - numbers.next().unwrap_or(0.0);
                 self.coordinates.push([s, t]);
@@ -242,15 +243,8 @@ fn read_library(
             };
             match kind {
                 "Kd" => {
-                    let numbers = rest.split_whitespace().map_while(|word| word.parse().ok());
-                    #[allow(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "the conversion saturates"
-                    )]
-                    let byte = |number: f64| (number * 255.0).round() as u8;
-                    for (channel, number) in material.color.iter_mut().zip(numbers) {
-                        *channel = byte(number);
+                    for (channel, number) in material.color.iter_mut().zip(numbers::<f64>(rest)) {
+                        *channel = byte(number * 255.0);
                     }
                 }
                 // Options precede the name.

@@ -1,6 +1,6 @@
 //! Object File Format (Geomview) files: counts of vertices and faces, then one line for each.
 
-use super::lines::Lines;
+use super::lines::{Lines, numbers};
 use super::raw::{FACE, RawMesh, Reading, position};
 use crate::error::{IoError, quote};
 use crate::limits::Limit;
@@ -29,8 +29,7 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     let mut line = "";
     for face in 0..faces {
         line = lines.record();
-        let words = line.split_whitespace();
-        let mut numbers = words.map_while(|word| word.parse::<i64>().ok());
+        let mut numbers = numbers::<i64>(line);
         let count = numbers.next().and_then(|count| usize::try_from(count).ok());
         let corners = numbers.take(count.unwrap_or(0)).map(|index| index as f64);
         let corners: Vec<f64> = corners.collect();

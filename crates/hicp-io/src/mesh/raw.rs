@@ -9,6 +9,7 @@ use super::colors::Colors;
 use super::polygon;
 use crate::error::{IoError, Place};
 use crate::limits::{Limit, ReadLimits};
+use crate::number::whole;
 use crate::unit::LengthUnit;
 
 /// The file being parsed, its unit and the limits.
@@ -108,11 +109,6 @@ impl<'a> RawMesh<'a> {
     }
 
     /// Adds the face with index `number` by its corners. Refuses a corner that is not a vertex.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the index is a whole number in range"
-    )]
     pub(super) fn add_corners(
         &mut self,
         place: Place,
@@ -129,7 +125,7 @@ impl<'a> RawMesh<'a> {
             let found = format!("vertex {index} in face {number}");
             return Err(self.reading.refuse(place, found, expected));
         }
-        let corners: Vec<u32> = corners.iter().map(|index| *index as u32).collect();
+        let corners: Vec<u32> = corners.iter().copied().map(whole).collect();
         self.add_face(place, &corners)
     }
 

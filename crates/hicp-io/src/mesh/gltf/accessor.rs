@@ -6,7 +6,7 @@ use super::schema::{Root, SparsePart};
 use crate::error::{IoError, Place, quote};
 use crate::limits::Limit;
 use crate::mesh::raw::Reading;
-use crate::number::{Kind, NumberType};
+use crate::number::{Kind, NumberType, whole};
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Accessors<'a, 'r> {
@@ -78,12 +78,7 @@ impl Accessors<'_, '_> {
             )?;
             let values = part(&sparse.values, accessor.component_type, components)?;
             for (index, value) in indices.iter().zip(values.chunks_exact(components)) {
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "a number beyond the end is refused"
-                )]
-                let at = *index as usize * components;
+                let at = whole(*index) as usize * components;
                 let Some(element) = numbers.get_mut(at..at + components) else {
                     let expected = format!("below {}", accessor.count);
                     return Err(self.reading.refuse(

@@ -18,6 +18,7 @@ use super::raw::{FACE, RawMesh, Reading};
 use crate::error::{IoError, Place};
 use crate::json;
 use crate::limits::Limit;
+use crate::number::whole;
 
 /// Parses the triangles of the default scene, with the transforms of its nodes.
 pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
@@ -202,12 +203,7 @@ impl<'a> Scene<'a, '_> {
             let vertices = order.map(|corner| corners[corner] + first as f64);
             self.mesh.add_corners(place.clone(), face, &vertices)?;
             if let Some((image, coordinates)) = &texture {
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "the corners are below the number of vertices"
-                )]
-                let coordinates = order.map(|corner| coordinates[corners[corner] as usize]);
+                let coordinates = order.map(|corner| coordinates[whole(corners[corner]) as usize]);
                 self.mesh.texture_face(*image, &coordinates);
             }
         }

@@ -15,6 +15,7 @@ use crate::limits::Limit;
 use crate::mesh::colors::Colors;
 use crate::mesh::raw::Reading;
 use crate::mesh::texture;
+use crate::number::{byte, narrow};
 
 /// The parts of a file that colors need. They are parsed separately, so that a fault in them leaves
 /// the geometry readable.
@@ -175,9 +176,9 @@ impl Paint {
         count: usize,
     ) -> Result<Vec<[f64; 3]>, IoError> {
         let factor = self.root.factor(primitive);
-        let byte = |linear: f64| 255.0 * encode(linear.clamp(0.0, 1.0));
+        let channel = |linear: f64| 255.0 * encode(linear.clamp(0.0, 1.0));
         let Some(index) = primitive.attributes.get("COLOR_0") else {
-            return Ok(vec![factor.map(byte); count]);
+            return Ok(vec![factor.map(channel); count]);
         };
         let shape = accessors
             .root
@@ -187,15 +188,11 @@ impl Paint {
         let components = if shape == Some("VEC4") { 4 } else { 3 };
         let numbers = accessors.read(*index, components, Limit::VERTICES)?;
         let numbers = numbers.chunks_exact(components);
-        let color = |c: &[f64]| [0, 1, 2].map(|channel| byte(c[channel] * factor[channel]));
+        let color = |c: &[f64]| [0, 1, 2].map(|i| channel(c[i] * factor[i]));
         Ok(numbers.map(color).collect())
     }
 
     /// Returns the texture coordinates of each vertex; zeros if its material has no texture.
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "f32 is the precision of buffers"
-    )]
     fn coordinates(
         &self,
         accessors: &Accessors<'_, '_>,
@@ -226,7 +223,7 @@ impl Paint {
             .chunks_exact(2)
             .map(|pair| (sx * pair[0], sy * pair[1]));
         let moved = pairs.map(|(s, t)| [x + cos * s + sin * t, y - sin * s + cos * t]);
-        Ok(moved.map(|pair| pair.map(|number| number as f32)).collect())
+        Ok(moved.map(|pair| pair.map(narrow)).collect())
     }
 }
 
@@ -257,15 +254,10 @@ impl Root {
         if factor == [1.0; 3] {
             return Ok(image);
         }
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "the conversion saturates"
-        )]
         let table = |factor: f64| -> Vec<u8> {
             let scaled = |byte| encode((factor * decode(f64::from(byte) / 255.0)).clamp(0.0, 1.0));
             (0..=255_u8)
-                .map(|byte| (255.0 * scaled(byte)).round() as u8)
+                .map(|value| byte(255.0 * scaled(value)))
                 .collect()
         };
         let tables = factor.map(table);

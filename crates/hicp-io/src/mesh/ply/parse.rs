@@ -10,6 +10,7 @@ use crate::error::{IoError, Place, quote};
 use crate::limits::Limit;
 use crate::mesh::raw::{FACE, RawMesh, Reading};
 use crate::mesh::texture;
+use crate::number::{narrow, whole};
 
 /// Returns an error if the header alone shows that the file has too many elements.
 ///
@@ -155,19 +156,10 @@ fn read_vertices(
 }
 
 /// Converts texture coordinates whose origin is the lower left corner.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "f32 is the precision of buffers"
-)]
 fn downward(s: f64, t: f64) -> [f32; 2] {
-    [s as f32, (1.0 - t) as f32]
+    [narrow(s), narrow(1.0 - t)]
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "corners are valid indices, and the numbers of textures are checked later"
-)]
 fn read_faces(
     rows: &mut Rows<'_>,
     element: &Element,
@@ -203,12 +195,16 @@ fn read_faces(
             }
             // The corners are valid indices, because the face was added.
             _ if !of_vertices.is_empty() => {
-                of_face.extend(corners.iter().map(|corner| of_vertices[*corner as usize]));
+                of_face.extend(
+                    corners
+                        .iter()
+                        .map(|corner| of_vertices[whole(*corner) as usize]),
+                );
             }
             _ => return Ok(()),
         }
         let image = part(FACE_IMAGE).and_then(|image| image.first());
-        mesh.texture_face(image.map_or(0, |image| *image as u32), &of_face);
+        mesh.texture_face(image.map_or(0, |image| whole(*image)), &of_face);
         Ok(())
     })
 }
