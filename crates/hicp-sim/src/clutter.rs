@@ -311,12 +311,10 @@ fn footprint(mesh: &TriMesh, rotation: &UnitQuaternion<f64>) -> ((f64, f64), f64
 }
 
 fn table() -> Result<TriMesh, SimError> {
-    #[allow(clippy::cast_possible_truncation)]
-    let half = TABLE_HALF_METERS as f32;
-    let corner = |x: f32, y: f32| Point3::new(x * half, y * half, 0.0);
-    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-    let vertices = corners.map(|(x, y)| corner(x, y)).to_vec();
-    Ok(TriMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]])?)
+    let half = TABLE_HALF_METERS;
+    let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
+    let vertices = corners.map(|(x, y)| Point3::new(x, y, 0.0).cast::<f32>());
+    Ok(TriMesh::new(vertices.to_vec(), vec![[0, 1, 2], [0, 2, 3]])?)
 }
 
 #[cfg(test)]

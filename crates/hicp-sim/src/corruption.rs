@@ -4,7 +4,8 @@ use hicp_core::{DepthImage, Mask, Observation, PixelRegion};
 
 use crate::case::Case;
 use crate::error::{SimError, check_range};
-use crate::mask::{Cut, MaskDefects, map_mask, pixels};
+use crate::mask::{Cut, MaskDefects, map_depth, map_mask};
+use crate::narrow;
 use crate::sensor::DepthSensor;
 use crate::stream::stream;
 
@@ -87,27 +88,17 @@ impl Corruption {
         let (nearest, farthest) = measured().fold((f32::INFINITY, 0.0_f32), |(low, high), z| {
             (low.min(z), high.max(z))
         });
-        #[allow(clippy::cast_possible_truncation)]
-        // f32 is the precision of depth images.
-        let (wall, board) = (
-            self.wall_behind_meters
-                .map(|behind| (f64::from(farthest) + behind) as f32),
-            (f64::from(nearest) - OCCLUDER_GAP_METERS).max(f64::from(nearest) * 0.5) as f32,
-        );
+        let (nearest, farthest) = (f64::from(nearest), f64::from(farthest));
+        let wall = self
+            .wall_behind_meters
+            .map(|behind| narrow(farthest + behind));
+        let board = narrow((nearest - OCCLUDER_GAP_METERS).max(nearest * 0.5));
         let hidden = around(&mask.bounding_region(), mask);
-        let image = PixelRegion::of_image(depth.width(), depth.height());
-        let new = pixels(&image)
-            .zip(depth.pixels())
-            .map(|((u, v), z)| match cut {
-                Some(cut) if hidden.contains(u, v) && cut.removes(u, v) => board,
-                _ if *z > 0.0 => *z,
-                _ => wall.unwrap_or(0.0),
-            });
-        Ok(DepthImage::from_meters(
-            depth.width(),
-            depth.height(),
-            new.collect(),
-        )?)
+        map_depth(depth, |u, v, z| match cut {
+            Some(cut) if hidden.contains(u, v) && cut.removes(u, v) => board,
+            _ if z > 0.0 => z,
+            _ => wall.unwrap_or(0.0),
+        })
     }
 }
 

@@ -66,3 +66,9 @@ pub type SimRng = rand_pcg::Pcg64Mcg;
 pub fn rng(seed: u64) -> SimRng {
     rand::SeedableRng::seed_from_u64(seed)
 }
+
+/// Rounds to `f32`, the precision of images and meshes.
+#[allow(clippy::cast_possible_truncation)]
+fn narrow(number: f64) -> f32 {
+    number as f32
+}

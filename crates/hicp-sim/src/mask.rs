@@ -1,6 +1,6 @@
 //! Defects of segmentations: masks that are too small, too large, or incomplete.
 
-use hicp_core::{Mask, PixelRegion};
+use hicp_core::{DepthImage, Mask, PixelRegion};
 use rand::RngExt;
 
 use crate::SimRng;
@@ -117,6 +117,17 @@ pub(crate) fn map_mask(
         .zip(mask.pixels())
         .map(|((u, v), set)| new(u, v, *set));
     Ok(Mask::new(mask.width(), mask.height(), set.collect())?)
+}
+
+/// Returns a depth image with `new(u, v, depth)` at every pixel.
+pub(crate) fn map_depth(
+    depth: &DepthImage,
+    mut new: impl FnMut(u32, u32, f32) -> f32,
+) -> Result<DepthImage, SimError> {
+    let (width, height) = (depth.width(), depth.height());
+    let depths = pixels(&PixelRegion::of_image(width, height)).zip(depth.pixels());
+    let depths = depths.map(|((u, v), z)| new(u, v, *z));
+    Ok(DepthImage::collect(width, height, depths)?)
 }
 
 /// Returns the pixels of a region, row by row.

@@ -68,85 +68,51 @@ pub enum Household {
     Ladle,
 }
 
+use Household::*;
+
 impl Household {
     /// Every object. The order is fixed; new objects are appended.
     // Open: resolution of the objects: §VI-A.1. Each has 2,000 to 10,000 triangles and 0.08 to 0.3
     // m.
     pub const ALL: [Self; 20] = [
-        Self::Mug,
-        Self::Bottle,
-        Self::Bowl,
-        Self::Carton,
-        Self::Bracket,
-        Self::Hammer,
-        Self::Plate,
-        Self::Iron,
-        Self::Car,
-        Self::Pan,
-        Self::Can,
-        Self::Laptop,
-        Self::Teapot,
-        Self::Knife,
-        Self::Book,
-        Self::Pot,
-        Self::Tape,
-        Self::Headphones,
-        Self::Camera,
-        Self::Ladle,
+        Mug, Bottle, Bowl, Carton, Bracket, Hammer, Plate, Iron, Car, Pan, Can, Laptop, Teapot,
+        Knife, Book, Pot, Tape, Headphones, Camera, Ladle,
     ];
 
     /// The ten objects for tuning thresholds (supplementary material, III). None is in
     /// [`Household::TEST`].
     pub const TUNING: [Self; 10] = [
-        Self::Bottle,
-        Self::Plate,
-        Self::Carton,
-        Self::Pot,
-        Self::Bracket,
-        Self::Teapot,
-        Self::Iron,
-        Self::Ladle,
-        Self::Car,
-        Self::Knife,
+        Bottle, Plate, Carton, Pot, Bracket, Teapot, Iron, Ladle, Car, Knife,
     ];
 
     /// The ten objects for reporting results (§VI-A.1).
     pub const TEST: [Self; 10] = [
-        Self::Bowl,
-        Self::Can,
-        Self::Tape,
-        Self::Book,
-        Self::Headphones,
-        Self::Laptop,
-        Self::Mug,
-        Self::Pan,
-        Self::Hammer,
-        Self::Camera,
+        Bowl, Can, Tape, Book, Headphones, Laptop, Mug, Pan, Hammer, Camera,
     ];
 
     /// Returns the name, and the function that builds the solid.
     fn shape(self) -> (&'static str, fn() -> Solid) {
         match self {
-            Self::Mug => ("mug", vessels::mug),
-            Self::Bottle => ("bottle", vessels::bottle),
-            Self::Bowl => ("bowl", vessels::bowl),
-            Self::Carton => ("carton", boxes::carton),
-            Self::Bracket => ("bracket", tools::bracket),
-            Self::Hammer => ("hammer", tools::hammer),
-            Self::Plate => ("plate", vessels::plate),
-            Self::Iron => ("iron", tools::iron),
-            Self::Car => ("car", boxes::car),
-            Self::Pan => ("pan", vessels::pan),
-            Self::Can => ("can", vessels::can),
-            Self::Laptop => ("laptop", boxes::laptop),
-            Self::Teapot => ("teapot", vessels::teapot),
-            Self::Knife => ("knife", tools::knife),
-            Self::Book => ("book", boxes::book),
-            Self::Pot => ("pot", vessels::pot),
-            Self::Tape => ("tape", tools::tape),
-            Self::Headphones => ("headphones", boxes::headphones),
-            Self::Camera => ("camera", boxes::camera),
-            Self::Ladle => ("ladle", vessels::ladle),
+            Mug => ("mug", vessels::mug),
+            Bottle => ("bottle", vessels::bottle),
+            Bowl => ("bowl", vessels::bowl),
+            Carton => ("carton", boxes::carton),
+            Bracket => ("bracket", tools::bracket),
+            Hammer => ("hammer", tools::hammer),
+            Plate => ("plate", vessels::plate),
+            Iron => ("iron", tools::iron),
+            Car => ("car", boxes::car),
+            Pan => ("pan", vessels::pan),
+            Can => ("can", vessels::can),
+            Laptop => ("laptop", boxes::laptop),
+            Teapot => ("teapot", vessels::teapot),
+            Knife => ("knife", tools::knife),
+            Book => ("book", boxes::book),
+            Pot => ("pot", vessels::pot),
+            Tape => ("tape", tools::tape),
+            Headphones => ("headphones", boxes::headphones),
+            Camera => ("camera", boxes::camera),
+            Ladle => ("ladle", vessels::ladle),
         }
     }
 
@@ -202,16 +168,13 @@ impl Household {
         let half_turn = |axis| turn(axis, 0.5);
         let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
         let discrete = match self {
-            Self::Can | Self::Tape | Self::Book => vec![half_turn(x)],
-            Self::Carton => [x, y, z].map(half_turn).to_vec(),
-            Self::Pot => (1..6).map(|k| turn(z, f64::from(k) / 6.0)).collect(),
-            Self::Headphones => vec![half_turn(z)],
+            Can | Tape | Book => vec![half_turn(x)],
+            Carton => [x, y, z].map(half_turn).to_vec(),
+            Pot => (1..6).map(|k| turn(z, f64::from(k) / 6.0)).collect(),
+            Headphones => vec![half_turn(z)],
             _ => Vec::new(),
         };
-        let revolves = matches!(
-            self,
-            Self::Bottle | Self::Bowl | Self::Plate | Self::Can | Self::Tape
-        );
+        let revolves = matches!(self, Bottle | Bowl | Plate | Can | Tape);
         let axis = SymmetryAxis::new(z, Point3::origin());
         Symmetries {
             discrete,

@@ -3,7 +3,8 @@
 use hicp_core::{DepthImage, PinholeCamera};
 
 use crate::SimRng;
-use crate::error::{SimError, check_range};
+use crate::error::{SimError, check_range, check_size};
+use crate::mask::pixels;
 use crate::sensor::distortion::{DEPTH_EDGE_METERS, Distortion};
 use crate::sensor::noise::{DepthNoise, map_depths};
 
@@ -70,31 +71,16 @@ impl DepthSensor {
             return Ok(measured);
         }
         let pixels = measured.pixels().iter().zip(lost);
-        let pixels = pixels
-            .map(|(z, lost)| if lost { 0.0 } else { *z })
-            .collect();
-        Ok(DepthImage::from_meters(
-            measured.width(),
-            measured.height(),
-            pixels,
-        )?)
+        let pixels = pixels.map(|(z, lost)| if lost { 0.0 } else { *z });
+        let (width, height) = (measured.width(), measured.height());
+        Ok(DepthImage::collect(width, height, pixels)?)
     }
 }
 
 impl Dropout {
     /// Returns whether each pixel is lost, row-major.
     fn lost(&self, depth: &DepthImage, camera: &PinholeCamera) -> Result<Vec<bool>, SimError> {
-        let (width, height) = (depth.width(), depth.height());
-        if (width, height) != (camera.width(), camera.height()) {
-            return Err(SimError::Image(hicp_core::ImageError::SizeMismatch {
-                first: "depth image",
-                first_width: width,
-                first_height: height,
-                second: "camera",
-                second_width: camera.width(),
-                second_height: camera.height(),
-            }));
-        }
+        check_size(depth, camera)?;
         if let Some(degrees) = self.max_incidence_degrees {
             check_range("largest incidence angle in degrees", degrees, 0.0..=90.0)?;
         }
@@ -103,16 +89,12 @@ impl Dropout {
         let min_cosine = self
             .max_incidence_degrees
             .map(|degrees| degrees.to_radians().cos());
-        let mut lost = Vec::with_capacity(depth.pixels().len());
-        for v in 0..height {
-            for u in 0..width {
-                let grazing = min_cosine.is_some_and(|min| {
-                    incidence_cosine(depth, camera, u, v).is_some_and(|c| c < min)
-                });
-                lost.push(grazing || self.near_edge(depth, u, v));
-            }
-        }
-        Ok(lost)
+        let is_lost = |(u, v)| {
+            let cosine = || incidence_cosine(depth, camera, u, v);
+            let grazing = min_cosine.is_some_and(|min| cosine().is_some_and(|c| c < min));
+            grazing || self.near_edge(depth, u, v)
+        };
+        Ok(pixels(&camera.region()).map(is_lost).collect())
     }
 
     fn near_edge(&self, depth: &DepthImage, u: u32, v: u32) -> bool {

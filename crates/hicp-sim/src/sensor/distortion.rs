@@ -5,6 +5,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::SimRng;
 use crate::error::{SimError, check_range};
+use crate::mask::map_depth;
+use crate::narrow;
 
 /// Depth difference between neighboring pixels that counts as a depth edge, meters.
 pub const DEPTH_EDGE_METERS: f64 = 0.02;
@@ -38,16 +40,11 @@ impl Distortion {
         check_range("fattening in pixels", fattening, -64.0..=64.0)?;
         let (width, height) = (perfect.width(), perfect.height());
         let field = (self.percent > 0.0).then(|| Field::draw(rng, self.area_pixels, width, height));
-        let mut depths = Vec::with_capacity(perfect.pixels().len());
-        for v in 0..height {
-            for u in 0..width {
-                let z = self.grown(perfect, u, v);
-                let error = field.as_ref().map_or(0.0, |field| field.at(u, v));
-                #[allow(clippy::cast_possible_truncation)] // f32 is the precision of images.
-                depths.push((f64::from(z) * (1.0 + self.percent / 100.0 * error)).max(0.0) as f32);
-            }
-        }
-        Ok(DepthImage::from_meters(width, height, depths)?)
+        map_depth(perfect, |u, v, _| {
+            let z = self.grown(perfect, u, v);
+            let error = field.as_ref().map_or(0.0, |field| field.at(u, v));
+            narrow((f64::from(z) * (1.0 + self.percent / 100.0 * error)).max(0.0))
+        })
     }
 
     /// Returns the depth of a pixel, or of the surface that grows over it at an edge.

@@ -11,6 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::SimRng;
 use crate::error::SimError;
+use crate::narrow;
 
 /// Gaussian noise with a standard deviation proportional to the depth, independent per pixel
 /// (§VI-B.2).
@@ -269,21 +270,11 @@ fn disturb(rng: &mut SimRng, depth: &DepthImage, measure: impl Fn(f64, f64) -> f
 
 /// Replaces every measured depth, in meters. Results that are not a valid depth become missing.
 pub(crate) fn map_depths(depth: &DepthImage, mut new: impl FnMut(f64) -> f64) -> DepthImage {
-    let pixels = depth
-        .pixels()
-        .iter()
-        .map(|z| {
-            if *z > 0.0 {
-                #[allow(clippy::cast_possible_truncation)]
-                // f32 is the precision of depth images.
-                let measured = new(f64::from(*z)) as f32;
-                measured
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    DepthImage::from_meters(depth.width(), depth.height(), pixels).unwrap_or_else(|_| depth.clone())
+    let pixels = depth.pixels().iter().map(|z| match *z > 0.0 {
+        true => narrow(new(f64::from(*z))),
+        false => 0.0,
+    });
+    DepthImage::collect(depth.width(), depth.height(), pixels).unwrap_or_else(|_| depth.clone())
 }
 
 #[cfg(test)]

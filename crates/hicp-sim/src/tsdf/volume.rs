@@ -3,9 +3,10 @@
 //! Source: Curless & Levoy, "A Volumetric Method for Building Complex Models from Range Images",
 //! 1996.
 
-use hicp_core::{DepthImage, ImageError, Isometry3, PinholeCamera, Point3, TriMesh, Vector3};
+use hicp_core::{DepthImage, Isometry3, PinholeCamera, Point3, TriMesh, Vector3};
 
-use crate::error::{SimError, check_range};
+use crate::error::{SimError, check_range, check_size};
+use crate::narrow;
 use crate::tsdf::meshing::ScalarGrid;
 
 /// Largest number of voxels. A voxel has two numbers of 4 bytes each.
@@ -120,17 +121,8 @@ impl TsdfVolume {
         camera: &PinholeCamera,
         camera_from_volume: &Isometry3<f64>,
     ) -> Result<(), SimError> {
+        check_size(depth, camera)?;
         let (width, height) = (depth.width(), depth.height());
-        if (width, height) != (camera.width(), camera.height()) {
-            return Err(SimError::Image(ImageError::SizeMismatch {
-                first: "depth image",
-                first_width: width,
-                first_height: height,
-                second: "camera",
-                second_width: camera.width(),
-                second_height: camera.height(),
-            }));
-        }
         self.images += 1;
         let [nx, ny, nz] = self.size;
         let spacing = self.config.voxel_meters;
@@ -200,9 +192,7 @@ impl TsdfVolume {
         if self.voxels.iter().all(|(_, weight)| *weight <= 0.0) {
             return Err(no_surface);
         }
-        #[allow(clippy::cast_possible_truncation)]
-        // f32 is the precision of voxels.
-        let truncation = self.config.truncation_meters as f32;
+        let truncation = narrow(self.config.truncation_meters);
         // A layer of free space around the volume closes the surface.
         let size = self.size.map(|n| n + 2);
         let mut values = vec![truncation; size.iter().product()];
@@ -232,13 +222,9 @@ impl TsdfVolume {
 }
 
 /// Adds a distance to a voxel's weighted mean.
-#[allow(clippy::cast_possible_truncation)]
-// f32 is the precision of voxels.
 fn merge(voxel: &mut (f32, f32), distance: f64, weight: f64) {
     let (mean, sum) = (f64::from(voxel.0), f64::from(voxel.1));
     let total = sum + weight;
-    *voxel = (
-        (mean + (distance - mean) * weight / total) as f32,
-        total as f32,
-    );
+    let mean = mean + (distance - mean) * weight / total;
+    *voxel = (narrow(mean), narrow(total));
 }
