@@ -72,6 +72,11 @@ pub(crate) fn progress_bar(length: usize, unit: &str) -> ProgressBar {
     bar
 }
 
+/// Returns a row of a [`table`] from its cells, between which is a `|`.
+pub(crate) fn row(cells: &str) -> Vec<String> {
+    cells.split('|').map(str::to_owned).collect()
+}
+
 /// Formats rows of cells in columns, the first `left` columns aligned left and the others right.
 pub(crate) fn table<R: AsRef<[String]>>(rows: &[R], left: usize) -> String {
     let mut widths: Vec<usize> = Vec::new();

@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::pose_json::add_pose;
-use crate::terminal::table;
+use crate::terminal::{row, table};
 
 /// The JSON report of a refinement; lengths in millimeters as in BOP, losses in m².
 #[derive(Debug, Serialize)]
@@ -158,22 +158,13 @@ fn verdict(verdict: Verdict) -> &'static str {
 
 /// Returns the trace as a table: one line per stage that ran.
 pub(crate) fn trace_table(stages: &[StageRecord]) -> String {
-    let heads = [
-        "stage",
-        "regime",
-        "association",
-        "metric",
-        "ended",
-        "iterations",
-        "pairs",
-        "mean loss mm²",
-    ];
-    let mut rows = vec![heads.map(str::to_owned)];
+    let heads = "stage|regime|association|metric|ended|iterations|pairs|mean loss mm²";
+    let mut rows = vec![row(heads)];
     rows.extend((1..).zip(stages).map(|(stage, record): (usize, _)| {
         let outcome = &record.outcome;
         let regime = record.switched.map_or("", |event| event.regime.name());
         let loss = outcome.evaluation.map(|e| e.mean_loss * 1e6);
-        [
+        vec![
             stage.to_string(),
             regime.to_owned(),
             record.association.to_owned(),

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::calibration::Calibration;
 use crate::bop::statistics::median;
-use crate::terminal::table;
+use crate::terminal::{row, table};
 
 /// The recalls of a part of the dataset.
 #[derive(Debug, Serialize)]
@@ -111,24 +111,13 @@ pub(crate) struct Report {
     pub(crate) adi_m: BTreeMap<usize, f64>,
 }
 
-const HEADS: [&str; 11] = [
-    "object",
-    "targets",
-    "missing",
-    "AR",
-    "VSD",
-    "MSSD",
-    "MSPD",
-    "AD(D/I)<0.1d",
-    "median ADI mm",
-    "MSSD<0.1d",
-    "ADD<0.1d",
-];
+const HEADS: &str = "object|targets|missing|AR|VSD|MSSD|MSPD|AD(D/I)<0.1d|median ADI mm|\
+    MSSD<0.1d|ADD<0.1d";
 
 impl Report {
     /// Returns a table of the recalls, objects first.
     pub(super) fn table(&self) -> String {
-        let mut rows = vec![HEADS.map(str::to_owned).to_vec()];
+        let mut rows = vec![row(HEADS)];
         let objects = self.objects.iter();
         rows.extend(objects.map(|(id, summary)| summary.cells(id.to_string())));
         rows.push(self.all.cells("all".to_owned()));

@@ -6,17 +6,7 @@ use hicp_bop::{FrameResult, RowResult};
 use hicp_io::IoError;
 use hicp_io::bop::ResultRow;
 
-const HEADER: [&str; 9] = [
-    "scene_id",
-    "im_id",
-    "obj_id",
-    "row",
-    "status",
-    "mve_initial",
-    "mve",
-    "confidence",
-    "warnings",
-];
+const HEADER: &str = "scene_id,im_id,obj_id,row,status,mve_initial,mve,confidence,warnings";
 
 /// Writes one line per row of the output, in the order of the output.
 ///
@@ -34,7 +24,7 @@ pub(super) fn write(
     of_rows.sort_by_key(|result| result.index);
     hicp_io::write_atomically(path, |file| {
         let mut lines = csv::Writer::from_writer(file);
-        lines.write_record(HEADER)?;
+        lines.write_record(HEADER.split(','))?;
         let mut place = 0..;
         for result in of_rows {
             let row = &rows[result.index];
