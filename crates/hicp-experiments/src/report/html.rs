@@ -105,7 +105,10 @@ fn in_markdown(text: &str) -> String {
 #[must_use]
 pub fn page(title: &str, body: &str) -> String {
     let title = escaped(title);
-    format!("{HEAD}<title>{title}</title>\n{STYLE}<h1>{title}</h1>\n{body}</body>\n</html>\n")
+    format!(
+        "{HEAD}<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
+         <h1>{title}</h1>\n{body}</body>\n</html>\n"
+    )
 }
 
 const HEAD: &str = "<!DOCTYPE html>
@@ -114,22 +117,7 @@ const HEAD: &str = "<!DOCTYPE html>
 <meta charset=\"utf-8\">
 ";
 
-const STYLE: &str = "<style>
-body { font: 15px/1.45 sans-serif; margin: 2em auto; max-width: 1440px; padding: 0 1em; color: #222 }
-table { border-collapse: collapse; margin: 1em 0; font-size: 13px; font-variant-numeric: tabular-nums; display: block; overflow-x: auto }
-th, td { border: 1px solid #ccc; padding: 3px 7px; text-align: left; vertical-align: top }
-th { background: #f2f2f2 }
-figure { margin: 0 }
-svg { max-width: 100%; height: auto }
-@media (max-width: 700px) { td { min-width: 6em } td:last-child { min-width: 20em } }
-.numbers th + th, .numbers td + td { text-align: right }
-.numbers td, .numbers td:last-child { min-width: 0 }
-.pictures { display: flex; flex-wrap: wrap; gap: 1em }
-.pictures img { max-width: 100% }
-</style>
-</head>
-<body>
-";
+const STYLE: &str = include_str!("page.css");
 
 #[cfg(test)]
 mod tests {

@@ -9,17 +9,9 @@ use super::curve::Panel;
 const MAX_LABELS: usize = 11;
 /// The palette of Okabe & Ito without yellow, and three more colors. Color-blind readers can
 /// distinguish it; each color also has its own marker.
-const PALETTE: [RGBColor; 10] = [
-    RGBColor(0, 114, 178),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(213, 94, 0),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
-    RGBColor(153, 153, 51),
-    RGBColor(136, 34, 85),
-    RGBColor(130, 130, 130),
+const PALETTE: [u32; 10] = [
+    0x0072b2, 0xe69f00, 0x009e73, 0xd55e00, 0xcc79a7, 0x56b4e9, 0x000000, 0x999933, 0x882255,
+    0x828282,
 ];
 
 /// The result of drawing on an area.
@@ -102,7 +94,8 @@ pub(super) fn draw_panel<B: DrawingBackend>(
 
 /// Returns the color of a place in the legend.
 fn color(style: usize) -> RGBColor {
-    PALETTE[style % PALETTE.len()]
+    let [_, red, green, blue] = PALETTE[style % PALETTE.len()].to_be_bytes();
+    RGBColor(red, green, blue)
 }
 
 /// Returns the corners of a marker at a place, pixels: a square, a diamond, and triangles in four

@@ -54,40 +54,35 @@ const DEPTH_STEPS: u32 = 5;
 /// Number of reconstructions.
 const MODEL_STEPS: u32 = 4;
 
+use Experiment::*;
+
 impl Experiment {
     /// Every study.
-    pub const ALL: [Self; 6] = [
-        Self::InitNoise,
-        Self::DepthNoise,
-        Self::ModelNoise,
-        Self::Timing,
-        Self::Alpha,
-        Self::Beyond,
-    ];
+    pub const ALL: [Self; 6] = [InitNoise, DepthNoise, ModelNoise, Timing, Alpha, Beyond];
 
     /// Returns the name on the command line and in files.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::InitNoise => "init-noise",
-            Self::DepthNoise => "depth-noise",
-            Self::ModelNoise => "model-noise",
-            Self::Timing => "timing",
-            Self::Alpha => "alpha",
-            Self::Beyond => "beyond",
-        }
+        self.names().0
     }
 
     /// Returns the heading in reports.
     #[must_use]
     pub fn title(self) -> &'static str {
+        self.names().1
+    }
+
+    fn names(self) -> (&'static str, &'static str) {
         match self {
-            Self::InitNoise => "Robustness to the initial pose (§VI-B.1)",
-            Self::DepthNoise => "Robustness to depth noise (§VI-B.2)",
-            Self::ModelNoise => "Robustness to model noise (§VI-B.3)",
-            Self::Timing => "Time (§VI-B.4, Table I)",
-            Self::Alpha => "The threshold α (§IV-A)",
-            Self::Beyond => "Beyond the paper: every start, every imperfection",
+            InitNoise => ("init-noise", "Robustness to the initial pose (§VI-B.1)"),
+            DepthNoise => ("depth-noise", "Robustness to depth noise (§VI-B.2)"),
+            ModelNoise => ("model-noise", "Robustness to model noise (§VI-B.3)"),
+            Timing => ("timing", "Time (§VI-B.4, Table I)"),
+            Alpha => ("alpha", "The threshold α (§IV-A)"),
+            Beyond => (
+                "beyond",
+                "Beyond the paper: every start, every imperfection",
+            ),
         }
     }
 
@@ -95,7 +90,7 @@ impl Experiment {
     #[must_use]
     pub fn household(self) -> [Household; 10] {
         match self {
-            Self::Alpha => Household::TUNING,
+            Alpha => Household::TUNING,
             _ => Household::TEST,
         }
     }
@@ -140,33 +135,31 @@ impl Experiment {
     fn conditions(self, case: u64) -> Vec<(String, Condition)> {
         let (binned, off) = (Condition::perfect(true), Condition::perfect(false));
         match self {
-            Self::InitNoise => vec![("0".to_owned(), binned)],
-            Self::DepthNoise => {
+            InitNoise => vec![("0".to_owned(), binned)],
+            DepthNoise => {
                 let levels = 0..=DEPTH_STEPS;
                 levels.map(|p| (p.to_string(), off.depth(p))).collect()
             }
-            Self::ModelNoise => {
+            ModelNoise => {
                 let levels = 0..=MODEL_STEPS;
                 levels.map(|l| (l.to_string(), off.model(l))).collect()
             }
-            Self::Timing => {
+            Timing => {
                 let one = |study: Self| {
                     let mut levels = study.conditions(0);
                     #[allow(clippy::cast_possible_truncation)] // Below the number of levels.
                     let nth = (case % levels.len() as u64) as usize;
                     (study.name().to_owned(), levels.swap_remove(nth).1)
                 };
-                [Self::InitNoise, Self::DepthNoise, Self::ModelNoise]
-                    .map(one)
-                    .into()
+                [InitNoise, DepthNoise, ModelNoise].map(one).into()
             }
-            Self::Alpha => {
+            Alpha => {
                 let alphas = (0..=ALPHA_STEPS).map(|step| f64::from(step) / f64::from(ALPHA_STEPS));
                 alphas
                     .map(|alpha| (format!("{alpha:.2}"), binned.alpha(alpha)))
                     .collect()
             }
-            Self::Beyond => {
+            Beyond => {
                 let mut all = vec![("perfect".to_owned(), binned)];
                 all.extend((1..=DEPTH_STEPS).map(|p| (format!("depth-{p}"), binned.depth(p))));
                 all.extend((1..=MODEL_STEPS).map(|l| (format!("model-{l}"), binned.model(l))));
@@ -180,24 +173,24 @@ impl Experiment {
     pub(super) fn groups(self, levels: &[String], n_bins: usize) -> Vec<Group> {
         let all: Vec<usize> = (0..levels.len()).collect();
         let mut groups = match self {
-            Self::InitNoise => Group::by_bin(&all, n_bins),
+            InitNoise => Group::by_bin(&all, n_bins),
             // The bins are those of the perfect images.
-            Self::Beyond => Group::by_bin(&all[..all.len().min(1)], n_bins),
+            Beyond => Group::by_bin(&all[..all.len().min(1)], n_bins),
             _ => Vec::new(),
         };
-        if self != Self::InitNoise {
+        if self != InitNoise {
             groups.extend(all.iter().map(|level| Group {
-                single: self != Self::Beyond,
+                single: self != Beyond,
                 ..Group::of_levels(&levels[*level], vec![*level])
             }));
         }
-        if self == Self::Beyond {
+        if self == Beyond {
             groups.extend(KINDS.map(|(label, kind)| {
                 let is_of_kind = |level: &usize| levels[*level].starts_with(kind);
                 Group::of_levels(label, all.iter().copied().filter(is_of_kind).collect())
             }));
         }
-        if matches!(self, Self::DepthNoise | Self::ModelNoise) {
+        if matches!(self, DepthNoise | ModelNoise) {
             let noisy = all.iter().copied().skip(1).collect();
             groups.push(Group::of_levels(NOISY, noisy));
         }
@@ -221,34 +214,27 @@ mod tests {
 
     #[test]
     fn levels_are_those_of_the_paper() {
-        assert_eq!(
-            Experiment::DepthNoise.levels(),
-            ["0", "1", "2", "3", "4", "5"]
-        );
-        assert_eq!(percent(Experiment::DepthNoise.condition(3, 7)), 3.0);
-        assert_eq!(Experiment::ModelNoise.levels().len(), 5);
-        assert_eq!(Experiment::ModelNoise.condition(4, 0).model_level, 4);
-        assert!(!Experiment::ModelNoise.condition(4, 0).binned);
-        let beyond = Experiment::Beyond.levels();
+        assert_eq!(DepthNoise.levels(), ["0", "1", "2", "3", "4", "5"]);
+        assert_eq!(percent(DepthNoise.condition(3, 7)), 3.0);
+        assert_eq!(ModelNoise.levels().len(), 5);
+        assert_eq!(ModelNoise.condition(4, 0).model_level, 4);
+        assert!(!ModelNoise.condition(4, 0).binned);
+        let beyond = Beyond.levels();
         assert_eq!((beyond.len(), beyond[3].as_str()), (14, "depth-3"));
-        assert_eq!(Experiment::Beyond.condition(9, 0).model_level, 4);
-        let occluded = Experiment::Beyond.condition(13, 0);
+        assert_eq!(Beyond.condition(9, 0).model_level, 4);
+        let occluded = Beyond.condition(13, 0);
         assert_eq!(occluded.corruption.occluded_share, 0.3);
         assert!(occluded.binned);
-        let alphas = Experiment::Alpha.levels();
+        let alphas = Alpha.levels();
         assert_eq!((alphas.len(), alphas[8].as_str()), (21, "0.40"));
-        assert_eq!(Experiment::Alpha.condition(8, 0).alpha, Some(0.4));
+        assert_eq!(Alpha.condition(8, 0).alpha, Some(0.4));
     }
 
     #[test]
     fn timing_cycles_through_every_level_of_the_other_studies() {
-        let percents: Vec<f64> = (0..6)
-            .map(|c| percent(Experiment::Timing.condition(1, c)))
-            .collect();
+        let percents: Vec<f64> = (0..6).map(|c| percent(Timing.condition(1, c))).collect();
         assert_eq!(percents, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
-        let models: Vec<u32> = (0..5)
-            .map(|c| Experiment::Timing.condition(2, c).model_level)
-            .collect();
+        let models: Vec<u32> = (0..5).map(|c| Timing.condition(2, c).model_level).collect();
         assert_eq!(models, [0, 1, 2, 3, 4]);
     }
 }
