@@ -77,26 +77,23 @@ impl ReadLimits {
         if is_bop(&root) {
             return self.read_camera_json(path, image_size);
         }
-        if root.is_array() {
-            return Form {
-                path,
-                key: "$".to_owned(),
-                root: &root,
-                camera: &root,
-            }
-            .read(image_size);
-        }
         let mut found = Vec::new();
-        cameras(&root, "$", 0, &mut found);
+        match root.is_array() {
+            true => found.push(("$".to_owned(), &root)),
+            false => cameras(&root, "$", 0, &mut found),
+        }
         let depth = found.iter().find(|(key, _)| key.ends_with(".depth"));
         match (&found[..], depth) {
-            ([(key, camera)], _) | (_, Some((key, camera))) => Form {
-                path,
-                key: key.clone(),
-                root: &root,
-                camera,
+            ([(key, camera)], _) | (_, Some((key, camera))) => {
+                let (key, root) = (key.clone(), &root);
+                let form = Form {
+                    path,
+                    key,
+                    root,
+                    camera,
+                };
+                form.read(image_size)
             }
-            .read(image_size),
             (found, _) => {
                 let keys: Vec<_> = found.iter().take(8).map(|(key, _)| quote(key)).collect();
                 let found = match found {
@@ -104,12 +101,8 @@ impl ReadLimits {
                     _ => format!("{} cameras: {}", found.len(), keys.join(", ")),
                 };
                 let expected = "one with `cam_K`, `K`, `camera_matrix`, `intrinsic_matrix`, or fx, fy, cx and cy";
-                Err(IoError::new(
-                    path,
-                    Place::Field("$".to_owned()),
-                    found,
-                    expected,
-                ))
+                let place = Place::Field("$".to_owned());
+                Err(IoError::new(path, place, found, expected))
             }
         }
     }
@@ -176,11 +169,8 @@ impl Form<'_> {
                 let meters = self.camera.get("ppx").or(self.camera.get("f_u")).is_some();
                 let scale = numbers(value).and_then(|numbers| numbers.first().copied());
                 let scale = scale.filter(|scale| *scale > 0.0).ok_or_else(|| {
-                    self.refuse(
-                        &format!(".{key}"),
-                        quote(&value.to_string()),
-                        "a number above 0",
-                    )
+                    let found = quote(&value.to_string());
+                    self.refuse(&format!(".{key}"), found, "a number above 0")
                 })?;
                 Some(if meters { scale * 1000.0 } else { scale })
             }
@@ -218,40 +208,22 @@ impl Form<'_> {
             }
         };
         let is_transposed = by_rows.m13 == 0.0 && by_rows.m23 == 0.0 && by_rows.m31 != 0.0;
-        Ok(if is_transposed {
-            by_rows.transpose()
-        } else {
-            by_rows
+        Ok(match is_transposed {
+            true => by_rows.transpose(),
+            false => by_rows,
         })
     }
 
     fn distortion(&self) -> Result<Option<Distortion>, IoError> {
-        let stated = self
-            .member(&DISTORTION)
-            .map(|(key, value)| (key, numbers(value)));
-        let model = self
-            .member(&MODEL)
-            .and_then(|(_, name)| name.as_str())
-            .unwrap_or_default();
-        let (key, mut k) = match stated {
-            Some((key, Some(k))) => (key, k),
-            _ => {
-                let names = [
-                    ["k1"],
-                    ["k2"],
-                    ["p1"],
-                    ["p2"],
-                    ["k3"],
-                    ["k4"],
-                    ["k5"],
-                    ["k6"],
-                ];
-                (
-                    "k1",
-                    names.map(|name| self.number(&name).unwrap_or(0.0)).to_vec(),
-                )
-            }
-        };
+        let stated = self.member(&DISTORTION);
+        let stated = stated.and_then(|(key, value)| Some((key, numbers(value)?)));
+        let model = self.member(&MODEL).and_then(|(_, name)| name.as_str());
+        let model = model.unwrap_or_default();
+        let (key, mut k) = stated.unwrap_or_else(|| {
+            let names = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+            let numbers = names.map(|name| self.number(&[name]).unwrap_or(0.0));
+            ("k1", numbers.to_vec())
+        });
         if k.iter().all(|k| *k == 0.0) {
             return Ok(None);
         }
@@ -262,15 +234,10 @@ impl Form<'_> {
         let has = |part: &str| name.contains(part);
         let fisheye = has("fisheye") || has("equidistant") || has("kannala");
         let inverse = has("inverse") || has("modified") || has("ftheta");
-        let brown = [
-            "",
-            "plumb_bob",
-            "rational_polynomial",
-            "radtan",
-            "opencv",
-            "pinhole",
-        ];
-        let brown = brown.contains(&&*name) || has("brown");
+        let brown = match &*name {
+            "" | "plumb_bob" | "rational_polynomial" | "radtan" | "opencv" | "pinhole" => true,
+            _ => has("brown"),
+        };
         if fisheye && let [k1, k2, k3, k4] = k[..] {
             return Ok(Some(Distortion::KannalaBrandt([k1, k2, k3, k4])));
         }
