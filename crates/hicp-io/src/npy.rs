@@ -14,7 +14,7 @@ use rawzip::{CompressionMethod, ZipArchive};
 use crate::error::{IoError, Place, quote};
 use crate::format::Format;
 use crate::limits::ReadLimits;
-use crate::number::{Kind, NumberType};
+use crate::number::{Kind, NumberType, whole};
 
 /// An array of numbers.
 #[derive(Debug)]
@@ -86,46 +86,32 @@ fn parse_npy<'a>(path: &Path, content: Cow<'a, [u8]>) -> Result<Array<'a>, IoErr
     // After the magic bytes: the version, and the length of the header in two or four bytes.
     let wide = content.get(6).is_some_and(|major| *major >= 2);
     let start = if wide { 12 } else { 10 };
-    let length = content.get(8..start).ok_or_else(cut)?;
-    let length = length
-        .iter()
-        .rev()
-        .fold(0, |sum, byte| sum << 8 | usize::from(*byte));
-    let end = start.saturating_add(length);
+    let length = NumberType::new(Kind::Unsigned, start - 8);
+    let length = length.read(content.get(8..).unwrap_or_default(), false);
+    let end = start + whole(length.ok_or_else(cut)?) as usize;
     let header = String::from_utf8_lossy(content.get(start..end).ok_or_else(cut)?).into_owned();
     let value = |key: &str| {
         let (_, value) = header.split_once(&format!("'{key}':"))?;
         Some(value.trim_start())
     };
-    let descr = value("descr").unwrap_or_default();
-    let descr = descr
-        .split(',')
-        .next()
-        .unwrap_or_default()
-        .trim_matches(['\'', ' ', '}']);
+    let descr = value("descr").and_then(|descr| descr.split(',').next());
+    let descr = descr.unwrap_or_default().trim_matches(['\'', ' ', '}']);
     if descr.ends_with('O') {
         let expected = "numbers: reading a pickle runs its code; in Python, \
                         np.load(FILE, allow_pickle=True) reads it and np.save writes its arrays";
-        return Err(refuse(
-            "a pickled array of Python objects".to_owned(),
-            expected,
-        ));
+        let found = "a pickled array of Python objects".to_owned();
+        return Err(refuse(found, expected));
     }
-    let number = number_type(descr).ok_or_else(|| {
-        refuse(
-            format!("the type {}", quote(descr)),
-            "real numbers of 1, 2, 4 or 8 bytes",
-        )
-    })?;
+    let Some(number) = number_type(descr) else {
+        let found = format!("the type {}", quote(descr));
+        return Err(refuse(found, "real numbers of 1, 2, 4 or 8 bytes"));
+    };
     let shape = || {
         let (shape, _) = value("shape")?.strip_prefix('(')?.split_once(')')?;
-        let lengths = shape
-            .split(',')
-            .map(str::trim)
-            .filter(|length| !length.is_empty());
-        lengths
-            .map(|length| length.parse().ok())
-            .collect::<Option<Vec<usize>>>()
+        let lengths = shape.split(',').map(str::trim);
+        let lengths = lengths.filter(|length| !length.is_empty());
+        let lengths: Result<Vec<usize>, _> = lengths.map(str::parse).collect();
+        lengths.ok()
     };
     let by_columns = value("fortran_order").map(|value| value.starts_with("True"));
     let (Some(shape), Some(by_columns)) = (shape(), by_columns) else {
@@ -136,21 +122,12 @@ fn parse_npy<'a>(path: &Path, content: Cow<'a, [u8]>) -> Result<Array<'a>, IoErr
         let found = format!("{} axes in Fortran order", shape.len());
         return Err(refuse(found, "np.ascontiguousarray(array)"));
     }
-    let count = shape
-        .iter()
-        .try_fold(1_usize, |product, length| product.checked_mul(*length));
-    let needed = count
-        .and_then(|count| count.checked_mul(number.bytes))
-        .unwrap_or(usize::MAX);
-    let (available, promised) = (content.len() - end, count.unwrap_or(usize::MAX) as u64);
-    let promise = (promised, "numbers");
-    IoError::check_promise(
-        path,
-        Place::Byte(0),
-        promise,
-        needed as u64,
-        available as u64,
-    )?;
+    let product = |product: usize, length: &usize| product.checked_mul(*length);
+    let count = shape.iter().try_fold(1, product).unwrap_or(usize::MAX);
+    let needed = count.saturating_mul(number.bytes);
+    let promised = (count as u64, "numbers");
+    let available = (content.len() - end) as u64;
+    IoError::check_promise(path, Place::Byte(0), promised, needed as u64, available)?;
     let data = match content {
         Cow::Borrowed(content) => Cow::Borrowed(&content[end..end + needed]),
         Cow::Owned(mut content) => {
@@ -198,21 +175,15 @@ fn member(
     while let Some(entry) = entries.next_entry().map_err(failed)? {
         let name = String::from_utf8_lossy(entry.file_path().as_ref()).into_owned();
         if let Some(name) = name.strip_suffix(".npy") {
-            arrays.push((
-                name.to_owned(),
-                entry.wayfinder(),
-                entry.compression_method(),
-            ));
+            let (place, method) = (entry.wayfinder(), entry.compression_method());
+            arrays.push((name.to_owned(), place, method));
         }
     }
     let named = arrays.iter().find(|(name, ..)| names.contains(&&**name));
     let only = arrays.first().filter(|_| arrays.len() == 1);
     let Some((name, wayfinder, method)) = only.or(named) else {
-        let shown: Vec<_> = arrays
-            .iter()
-            .take(8)
-            .map(|(name, ..)| quote(name))
-            .collect();
+        let shown = arrays.iter().take(8).map(|(name, ..)| quote(name));
+        let shown: Vec<String> = shown.collect();
         let found = format!("{} arrays: {}", arrays.len(), shown.join(", "));
         let expected = format!("a single array, or one named {}", names.join(" or "));
         return Err(IoError::new(path, None, found, expected));
@@ -226,12 +197,8 @@ fn member(
         CompressionMethod::DEFLATE => DeflateDecoder::new(data).take(most).read_to_end(&mut array),
         other => {
             let found = format!("{other:?} compression");
-            return Err(IoError::new(
-                path,
-                None,
-                found,
-                "np.savez or np.savez_compressed",
-            ));
+            let expected = "np.savez or np.savez_compressed";
+            return Err(IoError::new(path, None, found, expected));
         }
     };
     read.map_err(|error| {

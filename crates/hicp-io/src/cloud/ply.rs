@@ -19,10 +19,8 @@ pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, 
     let points = raw.vertices.iter().map(|p| (p / unit).cast::<f32>());
     // A file has normals for all vertices or for none.
     if raw.normals.iter().all(|n| n.iter().all(|x| x.is_nan())) {
-        return Ok(PointCloud {
-            points: points.collect(),
-            normals: None,
-        });
+        let (points, normals) = (points.collect(), None);
+        return Ok(PointCloud { points, normals });
     }
     let normal = |n: &Vector3<f64>| UnitVector3::try_new(n.cast::<f32>(), 1e-6);
     let normals = raw.normals.iter().map(normal);
@@ -32,17 +30,11 @@ pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, 
     let (points, normals): (Vec<_>, _) = surfels.unzip();
     if points.is_empty() {
         let expected = "finite numbers that are not all 0";
-        return Err(IoError::new(
-            reading.path,
-            None,
-            "no vertex with a normal",
-            expected,
-        ));
+        let found = "no vertex with a normal";
+        return Err(IoError::new(reading.path, None, found, expected));
     }
-    Ok(PointCloud {
-        points,
-        normals: Some(normals),
-    })
+    let normals = Some(normals);
+    Ok(PointCloud { points, normals })
 }
 
 /// Writes a point cloud as binary little-endian PLY, in meters.

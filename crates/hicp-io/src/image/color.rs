@@ -47,11 +47,10 @@ pub(crate) fn decode(
         Some(Format::Jpeg) => super::jpeg::decode(limits, path, content),
         #[cfg(not(feature = "jpeg"))]
         Some(Format::Jpeg) => Err(format::without_feature(path, Format::Jpeg, "jpeg")),
-        _ => Err(format::refuse(
-            path,
-            content,
-            "a color image as PNG or JPEG",
-        )),
+        _ => {
+            let expected = "a color image as PNG or JPEG";
+            Err(format::refuse(path, content, expected))
+        }
     }
 }
 
@@ -82,11 +81,8 @@ pub fn write_rgb_png(
     let path = path.as_ref();
     let expected = 3 * u128::from(width) * u128::from(height);
     if rgb.len() as u128 != expected {
-        let (found, expected) = (
-            format!("{} bytes of pixels", rgb.len()),
-            expected.to_string(),
-        );
-        return Err(IoError::new(path, None, found, expected));
+        let found = format!("{} bytes of pixels", rgb.len());
+        return Err(IoError::new(path, None, found, expected.to_string()));
     }
     let kind = (ColorType::Rgb, BitDepth::Eight);
     pixels::write(path, (width, height), kind, rgb)

@@ -28,22 +28,16 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
     // Layers of a renderer come before the last dot: "ViewLayer.Depth.Z".
     let is = |text: &Text, wanted: &str| {
         let text = text.to_string();
-        text.rsplit('.')
-            .next()
-            .is_some_and(|last| last.eq_ignore_ascii_case(wanted))
+        let last = text.rsplit('.').next();
+        last.is_some_and(|last| last.eq_ignore_ascii_case(wanted))
     };
-    let by_name = NAMES
-        .iter()
-        .find_map(|wanted| names.iter().find(|(_, name)| is(name, wanted)));
+    let of_name = |wanted| names.iter().find(|(_, name)| is(name, wanted));
+    let by_name = NAMES.into_iter().find_map(of_name);
     let Some((header, name)) = by_name.or(names.first().filter(|_| names.len() == 1)) else {
         let shown = names.iter().take(8).map(|(_, name)| format!("{name:?}"));
         let found = format!("the channels {}", shown.collect::<Vec<_>>().join(", "));
-        return Err(IoError::new(
-            path,
-            None,
-            found,
-            "a channel `Z`, or a single channel",
-        ));
+        let expected = "a channel `Z`, or a single channel";
+        return Err(IoError::new(path, None, found, expected));
     };
     let (width, height) = (header.layer_size.x() as u64, header.layer_size.y() as u64);
     // The crate divides by the size of a tile, and counts with it before it checks anything.
@@ -53,16 +47,10 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
         let found = format!("tiles of {:?} pixels", tiles.tile_size);
         return Err(IoError::new(path, None, found, "tiles with an area"));
     }
-    let raw = width
-        .saturating_mul(height)
-        .saturating_mul(2 * header.channels.list.len() as u64);
-    let size = check_size(
-        limits,
-        (path, 0),
-        (width, height),
-        raw,
-        content.len() as u64,
-    )?;
+    let pixel_bytes = 2 * header.channels.list.len() as u64;
+    let raw = width.saturating_mul(height).saturating_mul(pixel_bytes);
+    let available = content.len() as u64;
+    let size = check_size(limits, (path, 0), (width, height), raw, available)?;
     let image = read()
         .no_deep_data()
         .largest_resolution_level()

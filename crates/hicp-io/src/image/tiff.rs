@@ -27,13 +27,9 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
         ColorType::RGB(_) => (3, false),
         ColorType::RGBA(_) => (4, true),
         other => {
+            let found = format!("{other:?} colors");
             let expected = "gray, RGB or palette colors, with or without alpha";
-            return Err(IoError::new(
-                path,
-                None,
-                format!("{other:?} colors"),
-                expected,
-            ));
+            return Err(IoError::new(path, None, found, expected));
         }
     };
     let bits = usize::from(color.bit_depth());

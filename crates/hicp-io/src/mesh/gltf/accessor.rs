@@ -35,20 +35,18 @@ impl Accessors<'_, '_> {
         components: usize,
         limit: Limit,
     ) -> Result<Vec<f64>, IoError> {
+        let (reading, accessors) = (self.reading, &self.root.accessors);
         let place = Place::Field(format!("$.accessors[{index}]"));
-        let Some(accessor) = self.root.accessors.get(index) else {
-            let expected = format!("one of {} accessors", self.root.accessors.len());
-            return Err(self
-                .reading
-                .refuse(place, "an accessor that does not exist", expected));
+        let Some(accessor) = accessors.get(index) else {
+            let expected = format!("one of {} accessors", accessors.len());
+            return Err(reading.refuse(place, "an accessor that does not exist", expected));
         };
         let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"][components - 1];
         if accessor.shape != shape {
-            return Err(self.reading.refuse(place, quote(&accessor.shape), shape));
+            return Err(reading.refuse(place, quote(&accessor.shape), shape));
         }
         let per_item = if components == 1 { 3 } else { 1 };
-        self.reading
-            .check(limit, place.clone(), accessor.count / per_item)?;
+        reading.check(limit, place.clone(), accessor.count / per_item)?;
         let layout = Layout {
             offset: accessor.byte_offset,
             kind: accessor.component_type,
@@ -71,21 +69,15 @@ impl Accessors<'_, '_> {
                 };
                 self.elements(&place, part.buffer_view, layout)
             };
-            let indices = part(
-                &sparse.indices,
-                sparse.indices.component_type.unwrap_or(0),
-                1,
-            )?;
+            let kind = sparse.indices.component_type.unwrap_or(0);
+            let indices = part(&sparse.indices, kind, 1)?;
             let values = part(&sparse.values, accessor.component_type, components)?;
             for (index, value) in indices.iter().zip(values.chunks_exact(components)) {
                 let at = whole(*index) as usize * components;
                 let Some(element) = numbers.get_mut(at..at + components) else {
+                    let found = format!("sparse index {index}");
                     let expected = format!("below {}", accessor.count);
-                    return Err(self.reading.refuse(
-                        place,
-                        format!("sparse index {index}"),
-                        expected,
-                    ));
+                    return Err(reading.refuse(place, found, expected));
                 };
                 element.copy_from_slice(value);
             }
@@ -94,11 +86,11 @@ impl Accessors<'_, '_> {
     }
 
     /// Returns the bytes of a buffer view, if it is inside of its buffer.
-    pub(super) fn view(&self, index: usize) -> Option<Cow<'_, [u8]>> {
+    pub(super) fn view(&self, index: usize) -> Option<&[u8]> {
         let view = self.root.buffer_views.get(index)?;
         let end = view.byte_offset.checked_add(view.byte_length)?;
         let bytes = self.buffers.get(view.buffer)?;
-        Some(Cow::Borrowed(bytes.get(view.byte_offset..end)?))
+        bytes.get(view.byte_offset..end)
     }
 
     fn elements(&self, place: &Place, view: usize, layout: Layout) -> Result<Vec<f64>, IoError> {
@@ -108,11 +100,8 @@ impl Accessors<'_, '_> {
         let Some(found) = self.root.buffer_views.get(view) else {
             return refuse(format!("buffer view {view}"), "one that exists");
         };
-        if let Some(name) = found
-            .extensions
-            .keys()
-            .find(|name| name.contains("meshopt"))
-        {
+        let mut extensions = found.extensions.keys();
+        if let Some(name) = extensions.find(|name| name.contains("meshopt")) {
             let expected = "a file without meshopt compression: gltf-transform copy writes one";
             return refuse(format!("meshopt compression ({name})"), expected);
         }
@@ -121,9 +110,7 @@ impl Accessors<'_, '_> {
         };
         let element = number.bytes * layout.components;
         let stride = found.byte_stride.unwrap_or(element);
-        let end = found.byte_offset.checked_add(found.byte_length);
-        let bytes = self.buffers.get(found.buffer);
-        let bytes = bytes.and_then(|bytes| bytes.get(found.byte_offset..end?));
+        let bytes = self.view(view);
         let used = bytes.and_then(|bytes| {
             let before = stride.checked_mul(layout.count.saturating_sub(1))?;
             let last = layout.offset.checked_add(before)?.checked_add(element)?;
@@ -135,10 +122,8 @@ impl Accessors<'_, '_> {
             }
             let (count, size) = (layout.count, bytes.map_or(0, <[u8]>::len));
             let found = format!("{count} elements, {stride} bytes apart");
-            return refuse(
-                found,
-                &format!("as many as the {size} bytes of view {view} hold"),
-            );
+            let expected = format!("as many as the {size} bytes of view {view} hold");
+            return refuse(found, &expected);
         };
         let numbers = used.chunks(stride).flat_map(|element| {
             let components = element.chunks_exact(number.bytes).take(layout.components);

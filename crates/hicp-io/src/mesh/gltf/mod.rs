@@ -8,6 +8,8 @@ mod buffers;
 mod paint;
 mod schema;
 
+use std::collections::HashSet;
+
 use hicp_core::{Isometry3, Matrix4, Point3, Quaternion, Translation3, UnitQuaternion};
 
 use self::accessor::Accessors;
@@ -41,32 +43,23 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
             root: &root,
             buffers: &buffers,
         },
-        visited: vec![false; root.nodes.len()],
+        visited: HashSet::new(),
         paint,
         mesh: RawMesh::new(reading, reading.refuse(place, found, FACE)),
     };
     scene.mesh.colors = mesh_colors;
-    let chosen = root.scenes.get(root.scene.unwrap_or(0));
-    let mut open: Vec<(usize, Matrix4<f64>)> = match chosen {
-        Some(scene) => scene
-            .nodes
-            .iter()
-            .map(|node| (*node, Matrix4::identity()))
-            .collect(),
+    let tops: Vec<usize> = match root.scenes.get(root.scene.unwrap_or(0)) {
+        Some(scene) => scene.nodes.clone(),
         None => {
-            let mut is_child = vec![false; root.nodes.len()];
-            for child in root.nodes.iter().flat_map(|node| &node.children) {
-                is_child
-                    .get_mut(*child)
-                    .into_iter()
-                    .for_each(|is_child| *is_child = true);
-            }
-            let tops = (0..root.nodes.len()).filter(|node| !is_child[*node]);
-            tops.map(|node| (node, Matrix4::identity())).collect()
+            let children = root.nodes.iter().flat_map(|node| &node.children);
+            let children: HashSet<&usize> = children.collect();
+            let nodes = 0..root.nodes.len();
+            nodes.filter(|node| !children.contains(node)).collect()
         }
     };
     // The stack holds the first node on top, so that vertices are in the order of the file.
-    open.reverse();
+    let tops = tops.iter().rev().map(|node| (*node, Matrix4::identity()));
+    let mut open: Vec<(usize, Matrix4<f64>)> = tops.collect();
     while let Some((index, parent)) = open.pop() {
         let node = scene.visit(index)?;
         let world = parent * local(node);
@@ -95,7 +88,7 @@ fn local(node: &Node) -> Matrix4<f64> {
 
 struct Scene<'a, 'r> {
     accessors: Accessors<'a, 'r>,
-    visited: Vec<bool>,
+    visited: HashSet<usize>,
     /// The colors of the file, if there are any.
     paint: Option<Paint>,
     mesh: RawMesh<'r>,
@@ -105,23 +98,14 @@ impl<'a> Scene<'a, '_> {
     /// Returns a node. Refuses a node with two parents, which could multiply without end.
     fn visit(&mut self, index: usize) -> Result<&'a Node, IoError> {
         let place = Place::Field(format!("$.nodes[{index}]"));
-        let nodes = &self.accessors.root.nodes;
-        match (nodes.get(index), self.visited.get_mut(index)) {
-            (Some(node), Some(visited)) if !*visited => {
-                *visited = true;
-                Ok(node)
-            }
-            (None, _) | (_, None) => {
-                let expected = format!("one of {} nodes", nodes.len());
-                Err(self
-                    .mesh
-                    .reading
-                    .refuse(place, "a node that does not exist", expected))
-            }
-            _ => Err(self
-                .mesh
-                .reading
-                .refuse(place, "a node with two parents", "a tree of nodes")),
+        let (reading, nodes) = (self.mesh.reading, &self.accessors.root.nodes);
+        let Some(node) = nodes.get(index) else {
+            let expected = format!("one of {} nodes", nodes.len());
+            return Err(reading.refuse(place, "a node that does not exist", expected));
+        };
+        match self.visited.insert(index) {
+            true => Ok(node),
+            false => Err(reading.refuse(place, "a node with two parents", "a tree of nodes")),
         }
     }
 
@@ -129,11 +113,11 @@ impl<'a> Scene<'a, '_> {
         let root = self.accessors.root;
         let Some(mesh) = root.meshes.get(index) else {
             let place = Place::Field(format!("$.meshes[{index}]"));
-            let expected = format!("one of {} meshes", root.meshes.len());
-            return Err(self
-                .mesh
-                .reading
-                .refuse(place, "a mesh that does not exist", expected));
+            let (reading, expected) = (
+                self.mesh.reading,
+                format!("one of {} meshes", root.meshes.len()),
+            );
+            return Err(reading.refuse(place, "a mesh that does not exist", expected));
         };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = Place::Field(format!("$.meshes[{index}].primitives[{number}]"));
@@ -179,10 +163,8 @@ impl<'a> Scene<'a, '_> {
             Some(indices) => self.accessors.read(indices, 1, Limit::TRIANGLES)?,
             None => (0..count).map(|index| index as f64).collect(),
         };
-        if let Some(index) = corners
-            .iter()
-            .find(|index| !(0.0..count as f64).contains(*index))
-        {
+        let is_beyond = |index: &&f64| !(0.0..count as f64).contains(*index);
+        if let Some(index) = corners.iter().find(is_beyond) {
             let found = format!("vertex {index} of a face");
             return Err(reading.refuse(place.clone(), found, format!("below {count}")));
         }

@@ -1,5 +1,6 @@
 //! The colors of glTF files: base colors of materials, their textures, and vertex colors.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -115,12 +116,13 @@ impl Paint {
     pub(super) fn parse(reading: &Reading<'_>, text: &[u8]) -> Result<Option<Self>, IoError> {
         let root: Root = json::parse(reading.path, text)?;
         let mut primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-        let textured = primitives
-            .clone()
-            .any(|part| part.texture(&root.materials).is_some());
-        let colored =
+        let is_textured = |part: &Primitive| part.texture(&root.materials).is_some();
+        let is_colored =
             |part: &Primitive| part.material.is_some() || part.attributes.contains_key("COLOR_0");
-        let colored = primitives.any(colored);
+        let (textured, colored) = (
+            primitives.clone().any(is_textured),
+            primitives.any(is_colored),
+        );
         let images = BTreeMap::new();
         Ok(colored.then_some(Self {
             root,
@@ -141,21 +143,15 @@ impl Paint {
     ) -> Option<(u32, Vec<[f32; 2]>)> {
         let primitive = self.root.meshes.get(numbers.0)?.primitives.get(numbers.1)?;
         if !self.textured {
-            match self.vertex_colors(accessors, primitive, count) {
-                Ok(vertices) => vertices
-                    .into_iter()
-                    .for_each(|color| colors.add(color, true)),
-                Err(error) => colors.refuse(error),
-            }
+            let vertices = self.vertex_colors(accessors, primitive, count);
+            let vertices = vertices.map_err(|error| colors.refuse(error)).ok()?;
+            vertices
+                .into_iter()
+                .for_each(|color| colors.add(color, true));
             return None;
         }
-        let coordinates = match self.coordinates(accessors, primitive, count) {
-            Ok(coordinates) => coordinates,
-            Err(error) => {
-                colors.refuse(error);
-                return None;
-            }
-        };
+        let coordinates = self.coordinates(accessors, primitive, count);
+        let coordinates = coordinates.map_err(|error| colors.refuse(error)).ok()?;
         let reading = &accessors.reading;
         let image = match self.images.entry(primitive.material) {
             Entry::Occupied(known) => *known.get(),
@@ -180,12 +176,9 @@ impl Paint {
         let Some(index) = primitive.attributes.get("COLOR_0") else {
             return Ok(vec![factor.map(channel); count]);
         };
-        let shape = accessors
-            .root
-            .accessors
-            .get(*index)
-            .map(|found| &*found.shape);
-        let components = if shape == Some("VEC4") { 4 } else { 3 };
+        let accessor = accessors.root.accessors.get(*index);
+        let has_alpha = accessor.is_some_and(|found| found.shape == "VEC4");
+        let components = if has_alpha { 4 } else { 3 };
         let numbers = accessors.read(*index, components, Limit::VERTICES)?;
         let numbers = numbers.chunks_exact(components);
         let color = |c: &[f64]| [0, 1, 2].map(|i| channel(c[i] * factor[i]));
@@ -274,17 +267,17 @@ impl Root {
     ) -> Result<ColorImage, IoError> {
         let reading = &accessors.reading;
         let place = || Place::Field(format!("$.textures[{}]", texture.index));
-        let source = self
-            .textures
-            .get(texture.index)
-            .and_then(|texture| texture.source);
-        let image = source.and_then(|source| self.images.get(source));
+        let source = self.textures.get(texture.index).map(|found| found.source);
+        let image = source.flatten().and_then(|source| self.images.get(source));
         let data = match image {
             Some(Image { uri: Some(uri), .. }) => match uri.strip_prefix("data:") {
-                Some(data) => buffers::decode(data).map(Into::into),
+                Some(data) => buffers::decode(data).map(Cow::Owned),
                 None => return texture::read(reading, &uri.replace("%20", " ")),
             },
-            Some(Image { buffer_view, .. }) => buffer_view.and_then(|view| accessors.view(view)),
+            Some(Image { buffer_view, .. }) => {
+                let view = buffer_view.and_then(|view| accessors.view(view));
+                view.map(Cow::Borrowed)
+            }
             None => None,
         };
         let Some(data) = data else {
