@@ -198,16 +198,12 @@ impl<'a> BopImage<'a> {
     /// Reads a mask that is not held. Releases all other masks if the memory would be exceeded.
     fn read(&mut self, index: usize) -> Result<(), RowStatus> {
         if matches!(self.masks[index].seen, Seen::Unread) {
-            let held = self
-                .masks
-                .iter()
-                .filter(|other| other.seen.mask().is_some());
-            if (held.count() + 1) * self.image.depth.pixels().len() > self.memory {
-                let held = self
-                    .masks
-                    .iter_mut()
-                    .filter(|other| other.seen.mask().is_some());
-                held.for_each(|other| other.seen = Seen::Unread);
+            let others = self.masks.iter_mut();
+            let held: Vec<_> = others.filter(|other| other.seen.mask().is_some()).collect();
+            if (held.len() + 1) * self.image.depth.pixels().len() > self.memory {
+                for other in held {
+                    other.seen = Seen::Unread;
+                }
             }
             self.masks[index].seen = match self.masks[index].source.read(&self.image) {
                 Ok(mask) => Seen::Read(mask),

@@ -236,7 +236,7 @@ impl CaseMaker {
         }
         let mut poses = stream(seed, &[object, "pose"], index);
         let mut inits = stream(seed, &[object, "init"], index);
-        let (camera_from_object, start) = match self.config.init {
+        let (start, bin) = match self.config.init {
             InitialPose::Fixed {
                 translation_meters,
                 rotation_degrees,
@@ -245,22 +245,20 @@ impl CaseMaker {
                 let angle = rotation_degrees.to_radians();
                 let init = perturb(&mut inits, &truth, translation_meters, angle);
                 let vsd = self.vsd(model, &truth, &init);
-                (
+                let start = Start {
                     truth,
-                    Start {
-                        init,
-                        vsd,
-                        bin: None,
-                        tries: 1,
-                    },
-                )
+                    init,
+                    vsd,
+                    tries: 1,
+                };
+                (start, None)
             }
             InitialPose::Binned(bins) => {
                 #[allow(clippy::cast_possible_truncation)]
                 // Below the number of bins.
                 let bin = (index % bins.count as u64) as usize;
                 let found = self.start_in_bin(model, &bins, bin, &mut poses, &mut inits);
-                found.ok_or_else(|| SimError::UnfilledBin {
+                let start = found.ok_or_else(|| SimError::UnfilledBin {
                     object: object.to_owned(),
                     index,
                     bin,
@@ -269,19 +267,20 @@ impl CaseMaker {
                     high: (bin + 1) as f64 / bins.count as f64,
                     tried: bins.max_poses.saturating_mul(bins.tries_per_pose),
                     poses: bins.max_poses,
-                })?
+                })?;
+                (start, Some(bin))
             }
         };
         let camera = self.config.camera;
-        let depth = render_depth_image(model.mesh(), &camera, &camera_from_object);
+        let depth = render_depth_image(model.mesh(), &camera, &start.truth);
         Ok(Case {
             object: object.to_owned(),
             seed,
             index,
             camera,
-            camera_from_object,
+            camera_from_object: start.truth,
             init: start.init,
-            bin: start.bin,
+            bin,
             vsd_initial: start.vsd,
             tries: start.tries,
             mask: Mask::measured(&depth),
@@ -309,7 +308,7 @@ impl CaseMaker {
         bin: usize,
         poses: &mut SimRng,
         inits: &mut SimRng,
-    ) -> Option<(Isometry3<f64>, Start)> {
+    ) -> Option<Start> {
         let mut tries = 0;
         for _ in 0..bins.max_poses {
             let truth = self.draw_pose(model, poses);
@@ -319,15 +318,12 @@ impl CaseMaker {
                 let init = perturb(inits, &truth, translation, rotation_of(translation));
                 let vsd = self.vsd(model, &truth, &init);
                 if bins.bin_of(vsd) == bin {
-                    return Some((
+                    return Some(Start {
                         truth,
-                        Start {
-                            init,
-                            vsd,
-                            bin: Some(bin),
-                            tries,
-                        },
-                    ));
+                        init,
+                        vsd,
+                        tries,
+                    });
                 }
             }
         }
@@ -347,11 +343,11 @@ impl CaseMaker {
     }
 }
 
-/// An initial pose, its VSD and the number of tries.
+/// A true pose, an initial pose, its VSD and the number of tries.
 struct Start {
+    truth: Isometry3<f64>,
     init: Isometry3<f64>,
     vsd: f64,
-    bin: Option<usize>,
     tries: u32,
 }
 

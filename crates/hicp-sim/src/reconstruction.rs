@@ -200,17 +200,13 @@ impl Reconstruction {
             let pose = noise.disturbed(&mut of("error"), &truth);
             volume.integrate(&depth, &believed, &pose)?;
         }
-        let parts = components(&volume.surface()?)?;
+        let mut parts = components(&volume.surface()?)?;
         // Only parts that face outward count; a part that faces inward is the wall of a cavity.
-        let largest = parts
-            .iter()
-            .filter(|part| part.volume > 0.0)
-            .map(|part| part.area)
-            .fold(0.0, f64::max);
-        let kept = parts
-            .iter()
-            .filter(|part| part.volume > 0.0 && part.area >= MIN_COMPONENT_SHARE * largest)
-            .map(|part| &part.mesh);
+        parts.retain(|part| part.volume > 0.0);
+        // The parts are sorted by area, largest first.
+        let smallest = MIN_COMPONENT_SHARE * parts.first().map_or(0.0, |largest| largest.area);
+        let kept = parts.iter().filter(|part| part.area >= smallest);
+        let kept = kept.map(|part| &part.mesh);
         let config = ModelConfig {
             symmetries: model.symmetries().clone(),
             // Open: diameter of reconstructions: §VI-B.3. That of the original, so that the
