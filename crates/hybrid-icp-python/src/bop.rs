@@ -92,7 +92,8 @@ pub(crate) fn result_header() -> String {
 /// color : bool, optional
 ///     Use the colors of the meshes and the images in rgb/ if both exist.
 /// sensor : str, optional
-///     The sensor of scenes with several, such as "cam1" for scene_camera_cam1.json and depth_cam1/.
+///     The sensor of scenes with several, such as "cam1" for
+///     scene_camera_cam1.json and depth_cam1/.
 /// rescore : {"keep", "mve", "confidence"}, optional
 ///     The score of a refined row: its old score, 1 − MVE, or its
 ///     confidence.

@@ -1,6 +1,6 @@
-//! Linear algebra of small matrices that is compiled once, and not again in each crate that calls it.
+//! Linear algebra of small matrices, compiled once.
 //!
-//! It was a seventh of the code that the compiler had to optimize.
+//! The functions of nalgebra are generic, so each crate that calls them compiles them again.
 
 use nalgebra::{Cholesky, Matrix3, Matrix6, SymmetricEigen, U3, U6, Vector6};
 
