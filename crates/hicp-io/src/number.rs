@@ -64,6 +64,17 @@ pub(crate) fn whole(number: f64) -> u32 {
 
 /// Rounds to a byte. The nearest byte replaces a number out of range, and 0 replaces NaN.
 pub(crate) fn byte(number: f64) -> u8 {
-    let [.., byte] = whole(number.round().min(255.0)).to_be_bytes();
+    let [.., byte] = whole(number.round()).min(255).to_be_bytes();
     byte
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_saturate_and_nan_becomes_zero() {
+        let numbers = [f64::NAN, -3.0, 0.4, 0.5, 254.6, 1e9, f64::INFINITY];
+        assert_eq!(numbers.map(byte), [0, 0, 0, 1, 255, 255, 255]);
+    }
 }
