@@ -1,7 +1,8 @@
 //! The ICP engine: the trait [`Stage`], generic ICP, stop rules, and stages made of stages.
 //!
 //! Generic ICP is [`Icp`], Algorithm 1 of the paper. Its stop rules can reject a candidate, so that
-//! a stage returns the pose before it.
+//! a stage returns the pose before it. An [`Observer`] receives iterations, choices of switchers,
+//! decisions about scored poses, and ends of stages.
 //!
 //! **Should you use this crate?** Yes, to compose an ICP variant without the presets. To refine
 //! poses with one call, use `hybrid-icp`.

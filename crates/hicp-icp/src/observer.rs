@@ -9,8 +9,8 @@ use crate::outcome::{Evaluation, Outcome};
 
 /// Observes a run. All methods do nothing unless overridden.
 ///
-/// They are called per iteration or per stage, never per point. A tuple of up to eight observers
-/// passes every event to all of them, and breaks if one breaks.
+/// They are called per iteration, per scored pose or per stage, never per point. A tuple of up to
+/// eight observers passes every event to all of them, and breaks if one breaks.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an observer",
     label = "this must implement `Observer`",

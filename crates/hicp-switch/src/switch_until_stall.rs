@@ -77,10 +77,10 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for SwitchUntilStall<W, A, M> {
                 Verdict::KeptInitial(_) => held,
             };
             let gain = score(&held) - score(&found);
-            if next.verdict == Verdict::Refined {
+            if let (Verdict::Refined, Some(score)) = (next.verdict, found.score) {
                 let (pose, kept) = (&next.camera_from_object, gain > 0.0);
-                let scores = (score(&found), score(&held));
-                let event = DecisionEvent::new("alternate", pose, scores.0, scores.1, kept);
+                let best = held.score.unwrap_or(f64::INFINITY);
+                let event = DecisionEvent::new("alternate", pose, score, best, kept);
                 session.observer.on_decision(&event);
             }
             if gain > 0.0 {

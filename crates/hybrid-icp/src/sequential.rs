@@ -210,7 +210,7 @@ impl SequentialEstimator {
 
     /// Replaces the score of each estimate, which gates and covariances use as the MVE.
     ///
-    /// An estimate with a score above 1 is reported as [`SequentialEvent::Refused`].
+    /// A score that is not between 0 and 1 is reported as [`SequentialEvent::Refused`].
     #[must_use]
     pub fn with_score(mut self, score: impl Score + Send + 'static) -> Self {
         self.score = Some(Box::new(score));
