@@ -14,9 +14,7 @@ pub(crate) fn value(value: &Bound<'_, PyAny>) -> PyResult<String> {
     } else if let Ok(number) = value.call_method0("__index__") {
         Ok(number.repr()?.to_string())
     } else if let Ok(text) = value.cast::<PyString>() {
-        let text = text.to_string();
-        // The escapes of Rust are those of TOML, but for control characters other than \t, \n, \r.
-        Ok(format!("{text:?}"))
+        Ok(quoted(&text.to_string()))
     } else if let Ok(dict) = value.cast::<PyDict>() {
         let entries = dict
             .iter()
@@ -32,6 +30,16 @@ pub(crate) fn value(value: &Bound<'_, PyAny>) -> PyResult<String> {
         let expected = "a bool, a number, a string, a list or a dict";
         Err(array::unexpected("a field of a pipeline", value, expected))
     }
+}
+
+/// Writes a string as TOML. The escapes of Rust are others.
+fn quoted(text: &str) -> String {
+    let escaped = text.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if c.is_control() => format!("\\u{:04X}", u32::from(c)),
+        c => c.to_string(),
+    });
+    format!("\"{}\"", escaped.collect::<String>())
 }
 
 /// Reads overrides: a dict, or a sequence of assignments.

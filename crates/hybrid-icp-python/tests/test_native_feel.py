@@ -126,9 +126,11 @@ def test_fields_accept_the_scalars_of_numpy():
     gate = {"type": "max-distance", "limit": np.float64(0.1), "unit": "meters"}
     parts = {"selection": "visible-surface", "association": "projective", "metric": "point-to-plane"}
     assert "limit = 0.1," in hi.Pipeline.icp(**parts, filter=[gate]).toml
-    parts["metric"] = "Müller's"
-    with pytest.raises(hi.InputError, match='no metric is named "Müller.s"'):
-        hi.Pipeline.icp(**parts)
+    # The second has a combining accent, which Rust escapes and TOML does not.
+    for name in ["Müller's", "Mu\u0308ller", "tab\t and \x7f"]:
+        parts["metric"] = name
+        with pytest.raises(hi.InputError, match="no metric is named"):
+            hi.Pipeline.icp(**parts)
 
 
 def test_a_pipeline_of_parts_has_the_bits_of_its_file(scene):
