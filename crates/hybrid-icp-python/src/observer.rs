@@ -3,19 +3,19 @@
 use std::ops::ControlFlow;
 
 use hybrid_icp::Trace;
-use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
+use hybrid_icp::icp::{DecisionEvent, IterationEvent, Observer, RegimeEvent, StageEvent};
 use pyo3::prelude::*;
 
 use crate::errors::InputError;
 use crate::results::{self, Record};
 
 /// The methods of an observer, in the order of [`Watch::methods`].
-const METHODS: [&str; 3] = ["on_iteration", "on_regime", "on_stage_end"];
+const METHODS: [&str; 4] = ["on_iteration", "on_regime", "on_decision", "on_stage_end"];
 
 /// Records the trace of a run and passes its events to Python.
 pub(crate) struct Watch {
     pub(crate) trace: Trace,
-    methods: [Option<Py<PyAny>>; 3],
+    methods: [Option<Py<PyAny>>; METHODS.len()],
     /// The first exception that a method raised.
     raised: Option<PyErr>,
     stopped: bool,
@@ -25,7 +25,7 @@ impl Watch {
     /// Creates a watch for an object with any of the [`METHODS`], or for a callable that receives
     /// the iterations.
     pub(crate) fn new(observer: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        let mut methods = [None, None, None];
+        let mut methods = [const { None }; METHODS.len()];
         if let Some(observer) = observer {
             for (method, name) in methods.iter_mut().zip(METHODS) {
                 *method = observer.getattr_opt(name)?.map(Bound::unbind);
@@ -33,8 +33,8 @@ impl Watch {
             if methods.iter().all(Option::is_none) {
                 if !observer.is_callable() {
                     return Err(InputError::new_err(format!(
-                        "observer is {}, expected a callable or an object with on_iteration, on_regime \
-                         or on_stage_end",
+                        "observer is {}, expected a callable or an object with on_iteration, on_regime, \
+                         on_decision or on_stage_end",
                         crate::array::describe(observer)
                     )));
                 }
@@ -97,8 +97,12 @@ impl Observer for Watch {
         self.call(1, |py| results::regime(py, event));
     }
 
+    fn on_decision(&mut self, event: &DecisionEvent<'_>) {
+        self.call(2, |py| results::decision(py, event));
+    }
+
     fn on_stage_end(&mut self, event: &StageEvent<'_>) {
         self.trace.on_stage_end(event);
-        self.call(2, |py| results::stage_event(py, event));
+        self.call(3, |py| results::stage_event(py, event));
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hybrid_icp::icp::{
-    Alternative, IterationEvent, Outcome, Quality, RegimeEvent, StageEvent, Verdict,
+    Alternative, DecisionEvent, IterationEvent, Outcome, Quality, RegimeEvent, StageEvent, Verdict,
 };
 use hybrid_icp::{Alignment, Refinement, SequentialEvent, SequentialStep, StageRecord, Tracked};
 use pyo3::prelude::*;
@@ -72,6 +72,19 @@ pub(crate) fn regime<'py>(py: Python<'py>, event: &RegimeEvent) -> Record<'py> {
         RegimeEvent {
             regime: event.regime.name(),
             score: event.score
+        }
+    )
+}
+
+pub(crate) fn decision<'py>(py: Python<'py>, event: &DecisionEvent<'_>) -> Record<'py> {
+    record!(
+        py,
+        DecisionEvent {
+            stage: event.stage,
+            T_co: Matrix::from(event.camera_from_object),
+            score: event.score,
+            best: event.best,
+            kept: event.kept,
         }
     )
 }

@@ -162,13 +162,16 @@ def test_names_texts_files_and_pickles_give_the_same_pipeline(scene, tmp_path):
 
 class Recorder:
     def __init__(self):
-        self.iterations, self.regimes, self.stages = [], [], []
+        self.iterations, self.regimes, self.decisions, self.stages = [], [], [], []
 
     def on_iteration(self, event):
         self.iterations.append(event)
 
     def on_regime(self, event):
         self.regimes.append(event)
+
+    def on_decision(self, event):
+        self.decisions.append(event)
 
     def on_stage_end(self, event):
         self.stages.append(event)
@@ -187,6 +190,16 @@ def test_an_observer_receives_every_event_and_changes_nothing(scene):
     assert np.allclose(first.T_co, scene.rough, atol=1e-12) and first.iteration == 0
     second = recorder.iterations[1]
     assert np.allclose(first.increment @ first.T_co, second.T_co, atol=1e-9)
+
+
+def test_an_observer_receives_the_decisions_of_guards(scene):
+    recorder = Recorder()
+    hi.Pipeline.preset("local").refine(scene.model, scene.observation, scene.rough, recorder)
+    first = recorder.decisions[0]
+    assert first.stage == "guard" and first.kept and first.score < first.best
+    assert all(event.kept == (event.score < event.best) for event in recorder.decisions)
+    assert np.allclose(first.T_co, recorder.stages[0].T_co)
+    assert repr(first).startswith("DecisionEvent(guard keeps 0.")
 
 
 def test_an_observer_stops_with_false_and_its_exceptions_are_raised(scene):

@@ -68,6 +68,7 @@ from ._native import (
 from ._results import (
     Alignment,
     Alternative,
+    DecisionEvent,
     IterationEvent,
     RegimeEvent,
     Result,
@@ -80,6 +81,7 @@ __all__ = [
     "Alignment",
     "Alternative",
     "Camera",
+    "DecisionEvent",
     "DepthImage",
     "FileError",
     "Fuser",

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, Protocol, TypedDict, Union, final
 import numpy as np
 import numpy.typing as npt
-from ._results import Alignment, IterationEvent, RegimeEvent, Result, SequentialStep, StageEvent, Tracked
+from ._results import Alignment, DecisionEvent, IterationEvent, RegimeEvent, Result, SequentialStep, StageEvent, Tracked
 __all__ = ['Camera', 'DatasetRefiner', 'DepthImage', 'Fuser', 'Model', 'Observation', 'Pipeline', 'PoseEstimate', 'SequentialEstimator', 'Tracker', 'add', 'adi', 'align', 'fuse', 'mspd', 'mssd', 'mve', 'parts', 'point_to_plane_step', 'point_to_point_step', 'read_cloud', 'read_depth', 'read_depth_png', 'read_images', 'read_mask', 'read_mask_png', 'read_pose', 'render_depth', 'result_header', 'run_program', 'vsd']
 _Array = npt.NDArray[np.float64]
 _Unit = Literal['m', 'mm', 'cm']
@@ -24,11 +24,16 @@ class _OnRegime(Protocol):
     def on_regime(self, event: RegimeEvent, /) -> object:
         ...
 
+class _OnDecision(Protocol):
+
+    def on_decision(self, event: DecisionEvent, /) -> object:
+        ...
+
 class _OnStageEnd(Protocol):
 
     def on_stage_end(self, event: StageEvent, /) -> object:
         ...
-_Observer = Union[Callable[[IterationEvent], object], _OnIteration, _OnRegime, _OnStageEnd]
+_Observer = Union[Callable[[IterationEvent], object], _OnIteration, _OnRegime, _OnDecision, _OnStageEnd]
 
 @final
 class Camera:
@@ -718,9 +723,9 @@ class Pipeline:
             The initial pose, camera from object, meters.
         observer : callable or object, optional
             A callable receives an `IterationEvent` per iteration. An object can have any of the
-            methods `on_iteration`, `on_regime` and `on_stage_end`. If one of them returns `False`,
-            the run stops at the pose last evaluated. An exception stops the run and is raised
-            again.
+            methods `on_iteration`, `on_regime`, `on_decision` and `on_stage_end`. If one of them
+            returns `False`, the run stops at the pose last evaluated. An exception stops the run
+            and is raised again.
 
         Returns
         -------

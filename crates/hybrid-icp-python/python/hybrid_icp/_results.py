@@ -119,6 +119,35 @@ class RegimeEvent:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class DecisionEvent:
+    """The decision of a stage whether it keeps a pose that it scored.
+
+    Attributes
+    ----------
+    stage : str
+        Name of the stage: "guard", "keep-best", "alternate" or "hypothesis-search".
+    T_co : numpy.ndarray, shape (4, 4), float64
+        The scored pose, camera from object, meters.
+    score : float
+        Its score; lower is better.
+    best : float
+        The score of the best pose before it; infinity if there was none.
+    kept : bool
+        True if the stage keeps the pose, False if it rejects it.
+    """
+
+    stage: str
+    T_co: _Array
+    score: float
+    best: float
+    kept: bool
+
+    def __repr__(self) -> str:
+        verb = "keeps" if self.kept else "rejects"
+        return f"DecisionEvent({self.stage} {verb} {self.score:.3f} after {self.best:.3f})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class StageEvent:
     """An ICP stage that ended.
 
