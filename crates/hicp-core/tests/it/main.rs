@@ -13,23 +13,11 @@
     reason = "helpers of tests"
 )]
 
-mod camera;
 mod correspondences;
-mod decimation;
 mod derived;
-mod diameter;
 mod label;
-mod mesh;
-mod mesh_survey;
-mod model;
-mod normals;
-mod normals_definition;
-mod normals_limits;
-mod observation;
+mod object;
+mod pose;
 mod render;
-mod rotation;
-mod se3;
-mod sides;
-mod so3;
+mod sensor;
 mod support;
-mod symmetry;

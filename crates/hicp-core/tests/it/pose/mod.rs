@@ -1,0 +1,5 @@
+//! Tests of rotations and rigid motions.
+
+mod rotation;
+mod se3;
+mod so3;
