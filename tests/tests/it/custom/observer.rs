@@ -5,8 +5,10 @@ use std::ops::ControlFlow;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::scene;
 use hybrid_icp::core::{Isometry3, se3};
-use hybrid_icp::icp::{IterationEvent, Observer, StageEvent, Termination};
-use hybrid_icp::{Preset, Refiner};
+use hybrid_icp::icp::{
+    DecisionEvent, IterationEvent, Observer, SearchOptions, StageEvent, Start, Termination,
+};
+use hybrid_icp::{Preset, Refiner, presets};
 
 // --- The component ---
 
@@ -89,4 +91,35 @@ fn the_budget_is_that_of_all_stages_together() {
     assert_eq!(curve.ended[1].1, Termination::Stopped);
     assert_eq!(stopped.outcome.termination, Termination::Stopped);
     assert!(stopped.outcome.iterations < unobserved.outcome.iterations);
+}
+
+/// Stores the decisions of searches.
+#[derive(Default)]
+struct Decisions(Vec<(Isometry3<f64>, bool)>);
+
+impl Observer for Decisions {
+    fn on_decision(&mut self, event: &DecisionEvent<'_>) {
+        if event.stage == "hypothesis-search" {
+            self.0.push((*event.camera_from_object, event.kept));
+        }
+    }
+}
+
+#[test]
+fn a_search_reports_its_poses_and_at_last_the_returned_one() {
+    let scene = scene(Household::Iron, 0.0, &mut rng(2));
+    let options = SearchOptions {
+        start: Start::Ignored,
+        ..SearchOptions::default()
+    };
+    let mut decisions = Decisions::default();
+    let refined = Refiner::new(presets::search_with(options)).refine_observed(
+        &scene.model,
+        &scene.observation,
+        &Isometry3::translation(0.0, 0.0, 0.5),
+        &mut decisions,
+    );
+    let returned = (refined.outcome.camera_from_object, true);
+    assert_eq!(decisions.0.last(), Some(&returned));
+    assert!(decisions.0.iter().any(|(_, kept)| !kept));
 }
