@@ -320,6 +320,13 @@ impl Mask {
     /// # Errors
     ///
     /// [`ImageError::PixelCount`] if `pixels` does not hold `width * height` values.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), hicp_core::ImageError> {
+    /// let mask = hicp_core::Mask::from_u8(3, 1, &[0, 1, 255])?;
+    /// assert_eq!(mask.n_set(), 2);
+    /// # Ok(()) }
+    /// ```
     pub fn from_u8(width: u32, height: u32, pixels: &[u8]) -> Result<Self, ImageError> {
         Self::new(width, height, pixels.iter().map(|p| *p != 0).collect())
     }
