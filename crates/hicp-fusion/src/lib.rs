@@ -34,39 +34,23 @@
 //! Conventions: poses are `camera_from_object`. Twists are ξ = [ρ; φ], translation first, in meters
 //! and radians. Covariances describe left perturbations T = exp(ξ^) T̄ in the camera frame.
 
-mod batch;
-mod config;
 mod covariance;
 mod estimate;
 mod fuser;
 mod fusion;
-mod gate;
 mod information;
-mod method;
 mod motion;
-mod recursive;
-mod shared_error;
-mod single;
 mod solution;
-mod symmetry_aware;
 mod tails;
 mod unit;
 
-pub use batch::BatchFuser;
-pub use config::FuserConfig;
 pub use covariance::{CovarianceModel, InflatedCovariance, MVE_FLOOR, MveCovariance};
 pub use estimate::{FusionError, MAX_TRANSLATION_METERS, MAX_VARIANCE, PoseEstimate};
-pub use fuser::{Failure, Fuser, Update};
+pub use fuser::*;
 pub use fusion::{Fusion, fuse};
-pub use gate::{CHI_SQUARED_6_999, Gate, Gated};
 pub use hicp_core;
 pub use information::MIN_STANDARD_DEVIATION;
-pub use method::{BoxedFuser, FusionMethod, IntoFuser};
 pub use motion::{CameraMotion, Transport};
-pub use recursive::RecursiveFuser;
-pub use shared_error::SharedError;
-pub use single::{LastEstimate, MostConfident};
 pub use solution::{Fused, FusionLimits, Solution};
-pub use symmetry_aware::SymmetryAware;
 pub use tails::probability_within;
 pub use unit::UnitCovariance;

@@ -5,11 +5,11 @@ use std::str::FromStr;
 use hicp_core::UnknownName;
 use hicp_core::internal::named;
 
-use crate::batch::BatchFuser;
-use crate::config::FuserConfig;
-use crate::fuser::Fuser;
-use crate::recursive::RecursiveFuser;
-use crate::single::{LastEstimate, MostConfident};
+use crate::fuser::batch::BatchFuser;
+use crate::fuser::config::FuserConfig;
+use crate::fuser::fuser_trait::Fuser;
+use crate::fuser::recursive::RecursiveFuser;
+use crate::fuser::single::{LastEstimate, MostConfident};
 
 /// A boxed fuser, with the same bits as without the box.
 pub type BoxedFuser = Box<dyn Fuser + Send>;

@@ -1,7 +1,7 @@
 //! A gate that keeps failed estimates from moving the fused pose.
 
 use crate::estimate::{FusionError, PoseEstimate};
-use crate::fuser::{Failure, Fuser, Update};
+use crate::fuser::fuser_trait::{Failure, Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::solution::Solution;
 

@@ -2,9 +2,9 @@
 
 use hicp_core::Matrix6;
 
-use crate::config::FuserConfig;
 use crate::estimate::PoseEstimate;
-use crate::fuser::{Fuser, Update};
+use crate::fuser::config::FuserConfig;
+use crate::fuser::fuser_trait::{Fuser, Update};
 use crate::fusion::Fusion;
 use crate::motion::{CameraMotion, Transport};
 use crate::solution::Solution;

@@ -3,7 +3,7 @@
 use hicp_core::{Isometry3, Point3, Symmetries, SymmetryAxis, se3, so3};
 
 use crate::estimate::{FusionError, PoseEstimate};
-use crate::fuser::{Fuser, Update};
+use crate::fuser::fuser_trait::{Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::unit::UnitCovariance;
 

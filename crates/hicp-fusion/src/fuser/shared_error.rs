@@ -1,7 +1,7 @@
 //! An error that all estimates share.
 
 use crate::estimate::{FusionError, PoseEstimate};
-use crate::fuser::{Fuser, Update};
+use crate::fuser::fuser_trait::{Fuser, Update};
 use crate::motion::CameraMotion;
 use crate::unit::UnitCovariance;
 

@@ -2,10 +2,10 @@
 
 use hicp_core::Matrix6;
 
-use crate::batch::Weights;
-use crate::config::FuserConfig;
 use crate::estimate::PoseEstimate;
-use crate::fuser::{Fuser, Update};
+use crate::fuser::batch::Weights;
+use crate::fuser::config::FuserConfig;
+use crate::fuser::fuser_trait::{Fuser, Update};
 use crate::fusion::Fusion;
 use crate::motion::CameraMotion;
 use crate::solution::Solution;

@@ -1,7 +1,7 @@
 //! Methods that select one estimate and fuse nothing: `last-estimate` and `most-confident`.
 
 use crate::estimate::PoseEstimate;
-use crate::fuser::{Fuser, Update};
+use crate::fuser::fuser_trait::{Fuser, Update};
 use crate::information::log_determinant;
 use crate::motion::{CameraMotion, Transport};
 use crate::solution::Solution;
