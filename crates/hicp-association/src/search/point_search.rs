@@ -9,11 +9,13 @@ use crate::search::point_tree::PointTree;
 /// Finds the nearest of a set of points, exactly: for custom associations, filters and metrics.
 ///
 /// It is the tree of [`NearestNeighbor`](crate::NearestNeighbor). Points that are not finite are
-/// never found. Of equally near points, the first is found. Share it between threads and runs in
-/// the `derived()` cache of a model, cloud or observation; its key tells point sets apart.
+/// never found. Of equally near points, the first is found. To share it between threads and runs,
+/// store it in the `derived()` cache of a model, cloud or observation, with one key per set of
+/// points.
 ///
-/// It also leads from a pair to data per point, such as labels or colors. A pair holds the moved
-/// point, which a selection may have copied or rendered, so search at its place in the object:
+/// It also finds the data of the point behind a pair, such as a label or a color. A pair holds the
+/// moved point, which a selection may have copied or rendered. So search at its place in the
+/// object:
 ///
 /// ```
 /// use std::sync::Arc;
