@@ -48,6 +48,7 @@ mod variant;
 
 pub use analysis::{
     ADD_SHARE, Analysis, Cell, FAILURE_VSD, Interval, Metric, REPLICATES, WORSE_VSD, never_seen,
+    quantile,
 };
 pub use claims::{Claim, ClaimVerdict, EQUIVALENT_VSD};
 pub use error::ExperimentError;

@@ -89,7 +89,8 @@ pub fn never_seen(cases: usize) -> f64 {
 /// Returns a quantile of sorted values, interpolated between neighbors.
 ///
 /// If there are no values, returns `None`.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+#[must_use]
+pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share * last as f64;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

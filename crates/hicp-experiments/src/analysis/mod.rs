@@ -8,5 +8,5 @@ mod metric;
 pub use bootstrap::{Analysis, REPLICATES};
 pub use cell::Cell;
 pub(crate) use interval::percent;
-pub use interval::{Interval, never_seen};
+pub use interval::{Interval, never_seen, quantile};
 pub use metric::{ADD_SHARE, FAILURE_VSD, Metric, WORSE_VSD};

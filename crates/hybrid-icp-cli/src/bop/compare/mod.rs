@@ -1,6 +1,7 @@
 //! `hybrid-icp bop compare`.
 
 mod dots;
+mod interval;
 mod report;
 mod worst;
 
@@ -9,13 +10,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::Args;
-use hicp_bop::{MaskSource, Rescore};
+use hicp_bop::Rescore;
 
 use self::report::Comparison;
 use super::eval::{self, DELTA_MM, EvalJob};
 use super::models::ModelOptions;
 use super::options::{DatasetOptions, ThreadOptions};
-use super::refine::{RefineJob, RowOptions};
+use super::refine::{MaskOptions, RefineJob, RowOptions};
 use crate::choice::{Pipeline, Source};
 use crate::limits::limits;
 use crate::outputs::{Files, journal_of};
@@ -26,30 +27,38 @@ use crate::terminal::say;
 /// Writes the result file and the evaluation (JSON) of every pipeline. Writes the comparison as
 /// compare.md, compare.html and compare.json: average recalls, success by MSSD and ADD, the median
 /// ADI, the shares of the poses whose ADI fell and rose by more than 0.1 mm, and the time per pose
-/// on one thread with its ratio to that of the first pipeline; AR and median ADI by object. The
-/// page also has pictures of the three rows with the largest ADI after a pipeline. If a run is
-/// interrupted, the same command continues it.
+/// on one thread with its ratio to that of the first pipeline; AR and its difference from that of
+/// the first pipeline, with 95 % intervals; AR and median ADI by object. The page also has pictures
+/// of the three rows with the largest ADI after a pipeline. If a run is interrupted, the same
+/// command continues it.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     dataset: DatasetOptions,
     /// The result file to refine.
-    #[arg(long, value_name = "FILE.csv")]
-    init: PathBuf,
+    #[arg(long, value_name = "FILE.csv", visible_alias = "init")]
+    results: PathBuf,
     /// The pipelines: names (`hybrid-icp pipelines` lists them) or TOML files.
     #[arg(long, value_name = "A,B,…", value_delimiter = ',', required = true)]
     pipelines: Vec<Source>,
     /// The folder to write to, which is created if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// The file of targets, as for `bop eval`. All rows are refined.
+    #[arg(long, value_name = "FILE.json")]
+    targets: Option<PathBuf>,
+    #[command(flatten)]
+    masks: MaskOptions,
+    #[command(flatten)]
+    models: ModelOptions,
     #[command(flatten)]
     threads: ThreadOptions,
 }
 
 const EXAMPLE: &str = "\
 Example:
-  hybrid-icp bop compare --dataset bop/ycbv --init cosypose_ycbv-test.csv \\
+  hybrid-icp bop compare --dataset bop/ycbv --results cosypose_ycbv-test.csv \\
       --pipelines hybrid,nn-point-to-point --out compared";
 
 /// Name of the initial poses.
@@ -78,16 +87,21 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot make the folder {}", out.display()))?;
     arguments.check_files()?;
-    let mut comparison = Comparison::new(&arguments.dataset, &arguments.init);
-    comparison.add(INITIAL, arguments.evaluate(INITIAL, &arguments.init)?, None);
+    let masks = arguments.masks.source()?;
+    let mut comparison = Comparison::new(&arguments.dataset, &arguments.results, &arguments.masks);
+    comparison.add(
+        INITIAL,
+        arguments.evaluate(INITIAL, &arguments.results)?,
+        None,
+    );
     for (name, pipeline) in pipelines {
         let output = out.join(format!("{name}.csv"));
         let job = RefineJob {
             dataset: &arguments.dataset,
-            results: &arguments.init,
+            results: &arguments.results,
             choice: RowOptions::default(),
-            models: ModelOptions::default(),
-            masks: MaskSource::Visible,
+            models: arguments.models.clone(),
+            masks: masks.clone(),
             pipeline,
             output: &output,
             rows: None,
@@ -101,12 +115,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             distrusts: name != BASELINE,
             listed_by: None,
         };
-        let seconds = job.run(limits().read_results(&arguments.init)?)?;
+        let seconds = job.run(limits().read_results(&arguments.results)?)?;
         comparison.add(&name, arguments.evaluate(&name, &output)?, seconds);
     }
     let results = |name: &str| out.join(format!("{name}.csv"));
     let worst = comparison.worst();
-    let pictures = worst::pictures(&worst, &arguments.dataset, &arguments.init, results)?;
+    let pictures = worst::pictures(&worst, &arguments.dataset, &arguments.results, results)?;
     let html = comparison.html(&pictures);
     let texts = [comparison.markdown(), html, comparison.json()?];
     for (ending, text) in FORMS.iter().zip(texts) {
@@ -128,7 +142,7 @@ impl Arguments {
         let job = EvalJob {
             dataset: self.dataset.clone(),
             results: results.to_owned(),
-            targets: None,
+            targets: self.targets.clone(),
             symmetric: None,
             delta_mm: DELTA_MM,
             json: Some(json),
@@ -152,7 +166,9 @@ impl Arguments {
             written.extend([results, self.out.join(format!("{name}.json"))]);
         }
         let files = Files::default()
-            .reads("--init", [&self.init])
+            .reads("--results", [&self.results])
+            .reads("--targets", &self.targets)
+            .reads("--detections", &self.masks.detections)
             .reads(
                 "--pipelines",
                 self.pipelines.iter().filter_map(Source::file),

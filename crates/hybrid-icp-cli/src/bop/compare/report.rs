@@ -8,9 +8,11 @@ use hicp_experiments::{Table, html_escaped, html_page};
 use serde::Serialize;
 
 use super::dots::dot_plot;
+use super::interval::interval;
 use super::worst::Worst;
 use crate::bop::eval::{self, Summary};
 use crate::bop::options::{DatasetOptions, file_name};
+use crate::bop::refine::MaskOptions;
 
 /// Result files of one dataset: the initial one, and that of every pipeline.
 #[derive(Serialize)]
@@ -36,9 +38,15 @@ struct Entry {
     ms_per_pose: Option<f64>,
     /// Ratio to the time of the first pipeline.
     time_ratio: Option<f64>,
+    /// 95 % interval of AR.
+    ar_interval: Option<[f64; 2]>,
+    /// AR minus that of the first pipeline, with its 95 % interval.
+    ar_difference: Option<[f64; 3]>,
     objects: BTreeMap<u32, Summary>,
     #[serde(skip)]
     adi_m: BTreeMap<usize, f64>,
+    #[serde(skip)]
+    ar_by_image: Vec<(f64, usize)>,
 }
 
 /// Shares of the estimates in two evaluations.
@@ -67,21 +75,23 @@ const LOWEST: f64 = -1.0;
 const EXPLAINED: &str = "AR is the mean of the average recalls of VSD, MSSD and MSPD; ADI is that of the estimates matched to an \
     instance. ADD is over objects that are not symmetric. The row ray-shift moves each initial pose along its viewing ray by the \
     median depth difference. A pose is improved or worsened when its ADI fell or rose by more than 0.1 mm. Times are of one thread, for mask, \
-    normals and pipeline; compare their ratios.";
+    normals and pipeline; compare their ratios. The 95 % intervals are those of the bootstrap over images. If that of the difference contains 0, \
+    the order of the two pipelines is not certain. With few images, intervals are too narrow.";
 
 impl Comparison {
     /// Starts without entries.
-    pub(super) fn new(dataset: &DatasetOptions, init: &Path) -> Self {
+    pub(super) fn new(dataset: &DatasetOptions, init: &Path, masks: &MaskOptions) -> Self {
         Self {
             dataset: dataset.root.display().to_string(),
             split: dataset.split.clone(),
             init: init.display().to_string(),
             entries: Vec::new(),
             subject: format!(
-                "{} in {}, split {}",
+                "{} in {}, split {}{}",
                 file_name(init),
                 dataset.name(),
-                dataset.split
+                dataset.split,
+                masks.label()
             ),
         }
     }
@@ -89,30 +99,33 @@ impl Comparison {
     /// Adds an evaluation with the mean seconds per pose: first that of the initial poses, then
     /// that of the baseline, then that of every pipeline.
     ///
-    /// The time ratio of the baseline is unknown until the first pipeline is added.
+    /// Ratios and differences are unknown until the first pipeline is added.
     pub(super) fn add(&mut self, name: &str, evaluation: eval::Report, seconds: Option<f64>) {
-        let ms_per_pose = seconds.map(|s| 1e3 * s);
-        let place = self.entries.len();
-        let first = self
-            .entries
-            .get(FIRST)
-            .map_or(ms_per_pose, |e| e.ms_per_pose);
-        if let (FIRST, Some(baseline)) = (place, self.entries.last_mut()) {
-            baseline.time_ratio = baseline
-                .ms_per_pose
-                .zip(first)
-                .map(|(ms, first)| ms / first);
-        }
         let initial = self.entries.first();
         self.entries.push(Entry {
             name: name.to_owned(),
             changes: initial.map(|initial| changes(&initial.adi_m, &evaluation.adi_m)),
-            ms_per_pose,
-            time_ratio: ms_per_pose.zip(first).map(|(ms, first)| ms / first),
+            ms_per_pose: seconds.map(|s| 1e3 * s),
+            time_ratio: None,
+            ar_interval: interval(&evaluation.ar_by_image).map(|[_, low, high]| [low, high]),
+            ar_difference: None,
             all: evaluation.all,
             objects: evaluation.objects,
             adi_m: evaluation.adi_m,
+            ar_by_image: evaluation.ar_by_image,
         });
+        let Some(first) = self.entries.get(FIRST) else {
+            return;
+        };
+        let (ms, images) = (first.ms_per_pose, first.ar_by_image.clone());
+        for (place, entry) in self.entries.iter_mut().enumerate() {
+            entry.time_ratio = entry.ms_per_pose.zip(ms).map(|(own, first)| own / first);
+            if place != FIRST && entry.ar_difference.is_none() {
+                let pairs = entry.ar_by_image.iter().zip(&images);
+                let gains = pairs.map(|(own, first)| (own.0 - first.0, own.1));
+                entry.ar_difference = interval(&gains.collect::<Vec<_>>());
+            }
+        }
     }
 
     /// Returns the recalls, errors and times of all.
@@ -139,11 +152,21 @@ impl Comparison {
         let mut table = Table::new(&["pipeline"]);
         let heads = columns.iter().map(|(head, ..)| (*head).to_owned());
         table.head.extend(heads);
+        let intervals = ["AR, 95 %".to_owned(), format!("AR − {first}, 95 %")];
+        table.head.extend(intervals);
         for entry in &self.entries {
             let figures = columns.iter();
             let figures = figures.map(|(_, digits, _, figure)| number(figure(entry), *digits));
             let name = std::iter::once(entry.name.clone());
-            table.rows.push(name.chain(figures).collect());
+            let ar = entry
+                .ar_interval
+                .map(|[low, high]| format!("{low:.3} to {high:.3}"));
+            let gain = entry.ar_difference;
+            let gain = gain.map(|[all, low, high]| format!("{all:+.3} ({low:+.3} to {high:+.3})"));
+            let intervals = [ar, gain].map(|cell| cell.unwrap_or_else(|| "-".to_owned()));
+            table
+                .rows
+                .push(name.chain(figures).chain(intervals).collect());
         }
         for (column, (_, _, sign, _)) in (1..).zip(&columns) {
             let cells = (0..table.rows.len()).map(|row| (row, column));

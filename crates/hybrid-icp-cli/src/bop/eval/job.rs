@@ -118,6 +118,10 @@ impl EvalJob {
         }
         warnings.iter().for_each(warn);
         let targets: Vec<&Judged> = judged.iter().flat_map(|image| &image.targets).collect();
+        let ar_by_image = judged.iter().map(|image| {
+            let of_image = Summary::of(&image.targets.iter().collect::<Vec<_>>());
+            (of_image.ar * of_image.targets as f64, of_image.targets)
+        });
         let errors = targets
             .iter()
             .flat_map(|t| t.rows.iter().zip(&t.errors.estimates));
@@ -136,6 +140,7 @@ impl EvalJob {
             warnings,
             calibration,
             adi_m: adi_m.collect(),
+            ar_by_image: ar_by_image.collect(),
         };
         if let Some(path) = &self.errors {
             errors::write(path, &targets, &rows)?;

@@ -109,6 +109,9 @@ pub(crate) struct Report {
     /// ADI of the evaluated estimates to the nearest instance of their target in meters, by row.
     #[serde(skip)]
     pub(crate) adi_m: BTreeMap<usize, f64>,
+    /// The AR of each image, times the number of its instances, and that number.
+    #[serde(skip)]
+    pub(crate) ar_by_image: Vec<(f64, usize)>,
 }
 
 const HEADS: &str = "object|targets|missing|AR|VSD|MSSD|MSPD|AD(D/I)<0.1d|median ADI mm|\

@@ -2,6 +2,7 @@
 
 mod job;
 mod journal;
+mod mask_options;
 mod row_options;
 mod rows_file;
 mod run;
@@ -12,11 +13,11 @@ mod warnings;
 use std::path::PathBuf;
 
 use anyhow::bail;
-use clap::{Args, ValueEnum};
-use hicp_bop::{BoxMask, MaskSource};
+use clap::Args;
 use hicp_io::bop::ResultRow;
 
 pub(crate) use self::job::{JobOptions, RefineJob};
+pub(crate) use self::mask_options::MaskOptions;
 pub(crate) use self::row_options::RowOptions;
 use super::options::DatasetOptions;
 use crate::limits::limits;
@@ -44,32 +45,10 @@ pub(crate) struct Arguments {
     /// The result file to refine: CSV with scene_id, im_id, obj_id, score, R, t and time.
     #[arg(long, value_name = "IN.csv")]
     results: PathBuf,
-    /// Use the masks of a detections file (JSON with RLE segmentations) instead of mask_visib. A
-    /// detection without a segmentation needs a bbox, as for `bop estimate`.
-    #[arg(long, value_name = "FILE.json")]
-    detections: Option<PathBuf>,
-    /// The kind of mask.
-    #[arg(
-        long,
-        value_enum,
-        value_name = "WHAT",
-        default_value_t = MaskKind::Visible,
-        conflicts_with = "detections"
-    )]
-    mask: MaskKind,
+    #[command(flatten)]
+    masks: MaskOptions,
     #[command(flatten)]
     job: JobOptions,
-}
-
-/// The kind of mask.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum MaskKind {
-    /// The visible masks of the ground truth (mask_visib).
-    Visible,
-    /// No segmentation: a row uses all depth inside the model's bounding box at its pose. The box
-    /// is enlarged by a twentieth of the diameter. From rough poses, use it with auto. From good
-    /// ones, use projective-cascade-plane-point.
-    None,
 }
 
 const USAGE: &str = "\
@@ -93,16 +72,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = arguments;
     let files = Files::default()
         .reads("--results", [results])
-        .reads("--detections", &arguments.detections);
+        .reads("--detections", &arguments.masks.detections);
     arguments.job.check_files(files, "--results", dataset)?;
     let color = !arguments.job.models.no_color && dataset.has_color();
     let pipeline = arguments.job.pipeline.choose(color)?;
     let rows = arguments.read_rows()?;
-    let masks = match (&arguments.detections, arguments.mask) {
-        (Some(path), _) => MaskSource::detections(limits().read_detections(path)?),
-        (None, MaskKind::Visible) => MaskSource::Visible,
-        (None, MaskKind::None) => MaskSource::Box(BoxMask::default()),
-    };
+    let masks = arguments.masks.source()?;
     let job = arguments.job.job(dataset, results, masks, pipeline);
     job.run(rows).map(|_| ())
 }

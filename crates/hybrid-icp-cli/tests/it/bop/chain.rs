@@ -24,7 +24,7 @@ fn without_times(markdown: &str) -> String {
     let (table, rest) = markdown.split_once("\n\n").unwrap();
     for line in table.lines() {
         let cells: Vec<&str> = line.split('|').collect();
-        let (figures, times) = cells.split_at(cells.len() - 5);
+        let (figures, times) = cells.split_at(cells.len() - 7);
         let _ = writeln!(text, "{}|{}", figures.join("|"), times[2..].join("|"));
     }
     text + "\n" + rest
@@ -50,7 +50,7 @@ fn generate_refine_eval_compare_show() {
 
     let pipelines = "hybrid,projective-cascade-point-plane";
     let compare =
-        format!("compare --dataset set --init {initial} --pipelines {pipelines} --out compared");
+        format!("compare --dataset set --results {initial} --pipelines {pipelines} --out compared");
     // One of the pipelines fails for some rows, so there are warnings.
     let words = compare.split(' ');
     let told = run(folder, std::iter::once("bop").chain(words)).exits(0);

@@ -82,6 +82,16 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
             assert_eq!(&format!("{:.3}", report[key].as_f64().unwrap()), cell);
         }
         assert!(told.out.contains(&line.join(" | ")), "{}", told.out);
+        // The interval contains the AR, and the difference is that of two ARs.
+        let ends: Vec<f64> = line[12]
+            .split(" to ")
+            .map(|end| end.parse().unwrap())
+            .collect();
+        let ar = line[1].parse::<f64>().unwrap();
+        assert!(ends[0] <= ar && ar <= ends[1], "{line:?}");
+        let gain = line[13].split(' ').next().unwrap().parse::<f64>();
+        let expected = ar - cells[2][1].parse::<f64>().unwrap();
+        assert!(gain.map_or(line[0] == "hybrid", |gain| (gain - expected).abs() < 0.002));
     }
     assert_eq!(cells[0][6..10], ["-"; 4]);
     let number = |line: usize, cell: usize| cells[line][cell].parse::<f64>().unwrap();
@@ -148,6 +158,26 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
         );
     }
 
+    // The masks are those of `bop refine`, and only the given targets count.
+    let (rows, targets) = (document["entries"][0]["targets"].as_u64(), "targets.json");
+    let first = r#"[{"scene_id": 1, "im_id": 0, "obj_id": OBJ, "inst_count": 1}]"#;
+    let id = objects.keys().next().unwrap();
+    std::fs::write(folder.join(targets), first.replace("OBJ", id)).unwrap();
+    let options = "--mask none --no-color --models models --targets targets.json";
+    let words = format!(
+        "bop compare --dataset set --results set/initial_synthetic-test.csv --pipelines hybrid --out boxes {options}"
+    );
+    run(folder, words.split(' ')).exits(0);
+    let path = folder.join("boxes/compare.json");
+    let boxes: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    assert!(rows > Some(1) && boxes["entries"][0]["targets"] == 1);
+    assert_eq!(boxes["entries"][2]["ar_interval"], Value::Null);
+    let text = std::fs::read_to_string(folder.join("boxes/compare.md")).unwrap();
+    assert!(
+        text.contains("split test, without masks: 1 targets"),
+        "{text}"
+    );
+
     // `bop refine` alone writes the same poses.
     let words = "bop refine --dataset set --results set/initial_synthetic-test.csv --pipeline hybrid --output alone.csv";
     run(folder, words.split(' ')).exits(0);
@@ -156,6 +186,9 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
         rows.iter().map(|row| row.camera_from_object()).collect()
     };
     assert_eq!(poses("alone.csv"), poses("compared/hybrid.csv"));
+    let words = format!("{words} --mask none");
+    run(folder, words.split(' ')).exits(0);
+    assert_eq!(poses("alone.csv"), poses("boxes/hybrid.csv"));
 }
 
 #[test]
@@ -203,13 +236,13 @@ fn no_input_is_overwritten() {
             "out/hybrid.csv",
             "nn-point-to-point,hybrid",
             "out",
-            &["--out and --init both name out/hybrid.csv"][..],
+            &["--out and --results both name out/hybrid.csv"][..],
         ),
         (
             "out/hybrid.csv.journal",
             "hybrid",
             "./out",
-            &["--out and --init both name ./out/hybrid.csv.journal"],
+            &["--out and --results both name ./out/hybrid.csv.journal"],
         ),
         (
             "set/initial_synthetic-test.csv",
