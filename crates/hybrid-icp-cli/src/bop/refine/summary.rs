@@ -56,7 +56,7 @@ pub(super) fn summary(
     if distrust.unexplained > 0 {
         let count = distrust.unexplained;
         text.push_str(&format!(
-            "\n  {count:>7}  with an MVE of {PAPER_ALPHA} or more: do not trust them"
+            "\n  {count:>7}  with an MVE of {PAPER_ALPHA} or more and a confidence below {ACCEPTED}: do not trust them"
         ));
     }
     text
@@ -87,7 +87,7 @@ impl Distrust {
             (
                 unexplained,
                 format!(
-                    "{unexplained} of {rows} rows have an MVE of {PAPER_ALPHA} or more after refinement: do not trust them"
+                    "{unexplained} of {rows} rows have an MVE of {PAPER_ALPHA} or more after refinement and a confidence below {ACCEPTED}: do not trust them"
                 ),
             ),
             (

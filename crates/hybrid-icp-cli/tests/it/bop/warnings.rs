@@ -105,10 +105,12 @@ fn poses_that_do_not_explain_their_image_are_counted_and_reported_once() {
     let scored = read_results(world.path("out.csv")).unwrap();
     let bad = scored.iter().filter(|row| row.score <= 0.6).count();
     assert!(bad > rows.len() / 2, "{bad}");
-    let counted = format!("{bad:>7}  with an MVE of 0.4 or more: do not trust them");
+    let counted = format!(
+        "{bad:>7}  with an MVE of 0.4 or more and a confidence below 0.95: do not trust them"
+    );
     assert!(ranked.out.contains(&counted), "{}", ranked.out);
     let told = format!(
-        "warning: out.csv: {bad} of {} rows have an MVE of 0.4 or more after refinement: do not trust them",
+        "warning: out.csv: {bad} of {} rows have an MVE of 0.4 or more after refinement and a confidence below 0.95: do not trust them",
         rows.len()
     );
     let about_scores = |run: &Run| -> Vec<String> {
