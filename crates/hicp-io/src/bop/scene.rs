@@ -192,7 +192,7 @@ impl Scene {
     }
 
     fn picture_path(&self, folder: &str, im_id: u32) -> Option<PathBuf> {
-        let names = ["png", "jpg"].map(|ext| format!("{im_id:06}.{ext}"));
+        let names = ["png", "jpg", "tif"].map(|ext| format!("{im_id:06}.{ext}"));
         let mut paths = names.iter().map(|name| self.image(folder, name));
         paths.find(|path| !is_absent(path))
     }
@@ -338,6 +338,7 @@ mod tests {
             ("depth/000010.tif", ""),
             ("depth/000002.png", ""),
             ("gray/000002.jpg", ""),
+            ("gray/000010.tif", ""),
         ]);
         let scene = scene.unwrap();
         assert!(matches!(
@@ -347,7 +348,10 @@ mod tests {
         assert!(
             matches!(scene.read_depth(2), Err(IoError { place: Some(Place::Field(key)), .. }) if key == "$.2")
         );
-        assert!(scene.color_path(2).unwrap().ends_with("gray/000002.jpg"));
+        for path in ["gray/000002.jpg", "gray/000010.tif"] {
+            let id = path[5..11].parse().unwrap();
+            assert!(scene.color_path(id).unwrap().ends_with(path));
+        }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Color images: PNG and JPEG files.
+//! Color images: PNG, JPEG and TIFF files.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use crate::error::IoError;
 use crate::format::{self, Format};
 use crate::limits::ReadLimits;
 
-/// Reads a color image from a PNG file of any pixel type, or from a JPEG file.
+/// Reads a color image from a PNG file of any pixel type, or from a JPEG or TIFF file.
 ///
 /// The first bytes select the format. Gray values are repeated, 16-bit samples lose their low byte,
-/// and transparency is dropped. JPEG needs the feature `jpeg`.
+/// and transparency is dropped. JPEG needs the feature `jpeg`, and TIFF the feature `tiff`.
 ///
 /// # Errors
 ///
@@ -47,11 +47,38 @@ pub(crate) fn decode(
         Some(Format::Jpeg) => super::jpeg::decode(limits, path, content),
         #[cfg(not(feature = "jpeg"))]
         Some(Format::Jpeg) => Err(format::without_feature(path, Format::Jpeg, "jpeg")),
+        #[cfg(feature = "tiff")]
+        Some(Format::Tiff) => of_raster(path, &super::tiff::decode(limits, path, content)?),
+        #[cfg(not(feature = "tiff"))]
+        Some(Format::Tiff) => Err(format::without_feature(path, Format::Tiff, "tiff")),
         _ => {
-            let expected = "a color image as PNG or JPEG";
+            let expected = "a color image as PNG, JPEG or TIFF";
             Err(format::refuse(path, content, expected))
         }
     }
+}
+
+#[cfg(feature = "tiff")]
+fn of_raster(path: &Path, image: &super::raster::Raster) -> Result<ColorImage, IoError> {
+    let bits = image.integer_bits.filter(|_| image.background.is_none());
+    let Some(bits) = bits else {
+        let expected = "integers of gray, RGB or RGBA";
+        return Err(IoError::new(
+            path,
+            None,
+            "floating-point or palette colors",
+            expected,
+        ));
+    };
+    let scale = 255.0 / (2.0_f32.powi(bits.cast_signed()) - 1.0);
+    // A float converts to the nearest byte that it is within.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let byte = |sample: f32| (scale * sample) as u8;
+    let colors = image.channels - usize::from(image.has_alpha);
+    let pixels = image.samples.chunks_exact(image.channels);
+    let pixels = pixels.map(|p| [p[0], p[colors / 2], p[colors - 1]].map(byte));
+    let image = ColorImage::new(image.width, image.height, pixels.collect());
+    image.map_err(|error| IoError::unusable(path, "color image", error))
 }
 
 fn decode_png(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<ColorImage, IoError> {

@@ -18,7 +18,7 @@ pub(super) struct Raster {
     pub(super) has_alpha: bool,
     /// The bits of an integer sample, or `None` for floating point.
     pub(super) integer_bits: Option<u32>,
-    /// For a palette: whether an index is black or transparent.
+    /// For a palette: whether an index is black or transparent, if its colors are read.
     pub(super) background: Option<Vec<bool>>,
     /// The samples, row by row and pixel by pixel.
     pub(super) samples: Vec<f32>,

@@ -62,6 +62,8 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
     Ok(Raster {
         channels,
         has_alpha,
+        // The colors of a palette are not read.
+        background: matches!(color, ColorType::Palette(_)).then(Vec::new),
         ..Raster::gray(size, integer_bits, samples)
     })
 }

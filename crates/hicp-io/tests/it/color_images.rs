@@ -39,5 +39,18 @@ fn damaged_jpeg_images_and_images_beyond_the_limit_are_refused() {
     let error = limits.read_color(fixture("picture.jpg")).unwrap_err();
     assert_eq!(error.kind, IoErrorKind::Limit);
     let error = read_color(fixture("mask_red.bmp")).unwrap_err();
-    assert!(error.expected.contains("PNG or JPEG"), "{error}");
+    assert!(error.expected.contains("PNG, JPEG or TIFF"), "{error}");
+}
+
+#[test]
+fn tiff_images_have_the_colors_of_their_samples() {
+    let read = |name| read_color(fixture(name)).unwrap();
+    assert_eq!(read("mask_1_bit.tiff"), read("mask_1_bit.png"));
+    let gray = read("mask_u8.tiff");
+    let values = gray.pixels().as_flattened();
+    assert!(values.contains(&0) && values.iter().all(|value| [0, 255].contains(value)));
+    let white = read("mask_cut_out.tiff");
+    assert!(white.pixels().iter().all(|pixel| *pixel == [255; 3]));
+    let error = read_color(fixture("depth_f64.tiff")).unwrap_err();
+    assert!(error.found.contains("floating-point"), "{error}");
 }

@@ -84,7 +84,10 @@ fn a_color_image_of_another_size_is_refused() {
     let parts = ["rgb.png is 640x480", "320x240", "--depth-camera"];
     scene.run().exits(1).complains(&parts);
     scene.write("rgb.png", "not an image");
-    scene.run().exits(1).complains(&["rgb.png", "PNG or JPEG"]);
+    scene
+        .run()
+        .exits(1)
+        .complains(&["rgb.png", "PNG, JPEG or TIFF"]);
 }
 
 #[test]
@@ -116,7 +119,7 @@ fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
     let (damaged, _) = world.refine(&rows, &["--models", "models_color"]);
     damaged
         .exits(1)
-        .complains(&["rgb/000040.png", "PNG or JPEG", "by depth alone"])
+        .complains(&["rgb/000040.png", "PNG, JPEG or TIFF", "by depth alone"])
         .complains(&["1 files could not be used; 0 rows are unchanged"]);
     let (_, refined) = world.refine(&rows, &["--models", "models_color", "--no-color"]);
     for (color, depth) in refined.iter().zip(&depth_only) {
