@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Error, bail};
 use clap::Args;
 use hicp_bop::Models;
+use hicp_io::LengthUnit;
 use hicp_io::bop::{ResultRow, Scene, write_results};
 use hybrid_icp::core::Isometry3;
 use serde_json::Value;
@@ -26,11 +27,15 @@ pub(super) struct FollowOptions {
     /// The id of the object.
     #[arg(long, value_name = "ID")]
     pub(super) object: u32,
-    /// The rough pose in the first image: a pose file (JSON) or a result file (CSV), for example
-    /// of bop estimate. Of a result file, the row for that image and object with the highest score
-    /// is used.
-    #[arg(long, value_name = "FILE.json|FILE.csv")]
+    /// The rough pose in the first image: a pose file in a form of `refine`, or a result file
+    /// (CSV), for example of bop estimate. Of a result file, the row for that image and object with
+    /// the highest score is used.
+    #[arg(long, value_name = "FILE|FILE.csv")]
     pub(super) init: PathBuf,
+    /// Unit of the translation of a pose file: m, mm or cm. If not given: mm for cam_t_m2c, m for
+    /// all other forms.
+    #[arg(long, value_name = "UNIT")]
+    init_unit: Option<LengthUnit>,
     /// The id of the image to start with; the scene's first if not given.
     #[arg(long, value_name = "ID")]
     first: Option<u32>,
@@ -44,10 +49,15 @@ pub(super) struct FollowOptions {
 
 impl FollowOptions {
     /// Checks that the outputs can be written and replace no input.
-    pub(super) fn check_files(&self, pipeline: Option<&PathBuf>) -> anyhow::Result<()> {
+    pub(super) fn check_files(
+        &self,
+        pipeline: Option<&PathBuf>,
+        detections: Option<&PathBuf>,
+    ) -> anyhow::Result<()> {
         let files = Files::default()
             .reads("--init", [&self.init])
             .reads("--pipeline", pipeline)
+            .reads("--detections", detections)
             .writes("--output", [&self.output])
             .writes("--results", &self.results);
         files.check()?;
@@ -92,7 +102,7 @@ impl FollowOptions {
         let path = &self.init;
         if path.extension().is_none_or(|extension| extension != "csv") {
             let pose = limits()
-                .read_pose_json(path)
+                .read_pose(path, self.init_unit)
                 .context("cannot read --init")?;
             return Ok(pose.camera_from_object);
         }

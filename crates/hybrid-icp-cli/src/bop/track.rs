@@ -64,7 +64,7 @@ struct Line {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let follow = &arguments.follow;
-    follow.check_files(None)?;
+    follow.check_files(None, None)?;
     let dataset = follow.dataset.open()?;
     let scenes = Scenes::new(&dataset, &follow.dataset.split, 1);
     let (scene_id, object) = (follow.scene, follow.object);

@@ -16,6 +16,8 @@ pub(super) struct Line {
     pub(super) instance: Option<usize>,
     pub(super) fused: Isometry3<f64>,
     covariance: Option<Matrix6<f64>>,
+    /// The probability that the fused pose is right, if it was registered.
+    confidence: Option<f64>,
     /// The outcome from this image alone, and its MVE.
     pub(super) single: Option<(Outcome, Option<f64>)>,
     /// The outcome for programs: words joined by hyphens.
@@ -40,6 +42,7 @@ impl Line {
             instance: None,
             fused,
             covariance,
+            confidence: None,
             single: None,
             outcome: "moved",
             description: why,
@@ -49,13 +52,19 @@ impl Line {
     }
 
     /// Creates the report of an image that was registered.
-    pub(super) fn registered(im_id: u32, instance: usize, step: SequentialStep) -> Self {
+    pub(super) fn registered(
+        im_id: u32,
+        instance: Option<usize>,
+        step: SequentialStep,
+        confidence: f64,
+    ) -> Self {
         let (outcome, description, reason) = describe(&step.event);
         Self {
             im_id,
-            instance: Some(instance),
+            instance,
             fused: step.camera_from_object,
             covariance: step.covariance,
+            confidence: Some(confidence),
             single: Some((step.outcome, step.mve)),
             outcome,
             description,
@@ -73,6 +82,9 @@ impl Line {
         });
         if let Some(reason) = &self.reason {
             line["reason"] = json!(reason);
+        }
+        if let Some(confidence) = self.confidence {
+            line["confidence"] = json!(confidence);
         }
         if let Some(instance) = self.instance {
             line["instance"] = json!(instance);

@@ -5,11 +5,12 @@ mod line;
 mod tracker;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context as _, Error, bail};
 use clap::{Arg, Args, ValueEnum};
-use hicp_bop::Scenes;
+use hicp_bop::{MaskSource, Scenes};
 use hicp_io::bop::{ResultRow, Scene};
 use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::fusion::{CameraMotion, FusionError, FusionMethod};
@@ -23,20 +24,21 @@ use super::follow::FollowOptions;
 use super::statistics::median;
 use super::{faults, models};
 use crate::choice::{Pipeline, PipelineArguments};
+use crate::limits::limits;
 use crate::terminal::{progress_bar, say, warn};
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
 ///
 /// Images are read by ascending id. The camera's motion between them comes from cam_R_w2c and
 /// cam_t_w2c of scene_camera.json, so the object must stand still in the world. The initial pose
-/// for an image is the pose fused so far, moved with the camera. The mask is the visible mask
-/// (mask_visib) of the instance of the object that the model overlaps most at that pose. If an
-/// image has no such mask, the pose moves with the camera alone, and the line reports it.
+/// for an image is the pose fused so far, moved with the camera. The mask is that of the object's
+/// visible masks (mask_visib), or of its detections, that the model overlaps most at that pose. If
+/// an image has no such mask, the pose moves with the camera alone, and the line reports it.
 ///
 /// The output has one line of JSON per image: the fused pose (cam_R_m2c, cam_t_m2c in mm), its 6x6
-/// covariance, and the outcome of the image. Under "single", it has the pose from this image alone
-/// with its MVE. Covariances are in m and rad, translation first, for a left perturbation in the
-/// camera frame.
+/// covariance, its confidence (the probability that it is right, judged in this image), and the
+/// outcome of the image. Under "single", it has the pose from this image alone with its MVE.
+/// Covariances are in m and rad, translation first, for a left perturbation in the camera frame.
 ///
 /// The exit code is 0 even if images have no estimate; the summary counts them. It is 1 if a file
 /// is missing or damaged. If this is detected during the run, the lines are still written.
@@ -46,6 +48,9 @@ use crate::terminal::{progress_bar, say, warn};
 pub(crate) struct Arguments {
     #[command(flatten)]
     follow: FollowOptions,
+    /// Use the masks of a detections file, as for `bop refine`. Ground truth is then not needed.
+    #[arg(long, value_name = "FILE.json")]
+    detections: Option<PathBuf>,
     /// The fusion of estimates: last-estimate, average, weighted-average, filtering-constant,
     /// filtering or most-confident.
     #[arg(long, value_name = "NAME", default_value = "weighted-average")]
@@ -86,7 +91,7 @@ Example:
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let follow = &arguments.follow;
-    follow.check_files(arguments.pipeline.file())?;
+    follow.check_files(arguments.pipeline.file(), arguments.detections.as_ref())?;
     let pipeline = arguments.pipeline.choose(false)?;
     let dataset = follow.dataset.open()?;
     let scenes = Scenes::new(&dataset, &follow.dataset.split, 1);
@@ -95,7 +100,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .get(scene_id)
         .map_err(|fault| Error::msg(fault.text))?;
     let path = camera_path(&scene, &follow.images(&scene)?)?;
-    check_object(&scene, &path, object)?;
+    let masks = match &arguments.detections {
+        Some(path) => MaskSource::detections(limits().read_detections(path)?),
+        None => {
+            check_object(&scene, &path, object)?;
+            MaskSource::Visible
+        }
+    };
     let models_dir = dataset.models_dir()?;
     let models = follow.model(&models_dir)?;
     let model = &models.by_id[&object];
@@ -106,7 +117,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let start = Instant::now();
     let progress = progress_bar(path.len(), "images");
-    let mut tracker = Tracker::new(&scenes, (scene_id, object), model, estimator);
+    let mut tracker = Tracker::new(&scenes, (scene_id, object), model, &masks, estimator);
     let mut lines = Vec::with_capacity(path.len());
     for (im_id, motion) in &path {
         lines.push(tracker.image(*im_id, motion));
@@ -187,7 +198,7 @@ fn check_object(scene: &Scene, path: &[(u32, CameraMotion)], object: u32) -> any
     }
     if hicp_io::is_absent(&file) {
         bail!(
-            "{} does not exist, but is required: it assigns masks to objects",
+            "{} does not exist, but is required: it assigns masks to objects, unless --detections is given",
             file.display()
         );
     }

@@ -13,8 +13,9 @@ pub(super) struct Tracker<'a> {
     scene: u32,
     object: u32,
     model: &'a Model,
+    masks: &'a MaskSource,
     estimator: SequentialEstimator,
-    /// Renders the model to select a mask.
+    /// Renders the model to select a mask, and judges the fused pose.
     refiner: Refiner,
     /// Files that were missing or damaged.
     pub(super) faults: Vec<Fault>,
@@ -27,6 +28,7 @@ impl<'a> Tracker<'a> {
         scenes: &'a Scenes,
         (scene, object): (u32, u32),
         model: &'a Model,
+        masks: &'a MaskSource,
         estimator: SequentialEstimator,
     ) -> Self {
         Self {
@@ -34,6 +36,7 @@ impl<'a> Tracker<'a> {
             scene,
             object,
             model,
+            masks,
             estimator,
             refiner: Refiner::preset(Preset::Hybrid),
             faults: Vec::new(),
@@ -60,9 +63,9 @@ impl<'a> Tracker<'a> {
             })
     }
 
-    /// Registers an image in the visible mask of one instance of the object.
+    /// Registers an image in one mask of the object.
     ///
-    /// It is the instance that the model overlaps most at the predicted pose.
+    /// It is the mask that the model overlaps most at the predicted pose.
     fn register(
         &mut self,
         im_id: u32,
@@ -76,18 +79,22 @@ impl<'a> Tracker<'a> {
             status
         })?;
         let truths = image.scene.ground_truth(im_id).unwrap_or_default().to_vec();
-        let mut image = MaskSource::Visible.frame(key, image);
+        let mut image = self.masks.frame(key, image);
         let masks = image.choose(&mut self.refiner, self.model, self.object, &[*predicted]);
-        // The masks are those of the instances, in their order.
-        let instance = masks.into_iter().next().unwrap_or(Err(RowStatus::NoMask));
-        let line = instance.and_then(|instance| {
-            let observation = image.observation(instance)?;
+        let mask = masks.into_iter().next().unwrap_or(Err(RowStatus::NoMask));
+        let line = mask.and_then(|mask| {
+            let observation = image.observation(mask)?;
             let model = self.model;
             self.warnings
                 .get_or_insert_with(|| (im_id, warnings(model, observation, predicted)));
             let step = self.estimator.step(model, observation, motion);
-            let mut line = Line::registered(im_id, instance, step);
-            if let (Some((single, _)), Some(truth)) = (&line.single, truths.get(instance)) {
+            let fused = step.camera_from_object;
+            let confidence = self.refiner.judge(model, observation, &fused).confidence;
+            // The visible masks are those of the instances, in their order.
+            let instance = matches!(self.masks, MaskSource::Visible).then_some(mask);
+            let mut line = Line::registered(im_id, instance, step, confidence);
+            let truth = instance.and_then(|instance| truths.get(instance));
+            if let (Some((single, _)), Some(truth)) = (&line.single, truth) {
                 let expected = truth.camera_from_object * model.center();
                 let off = |pose: &Isometry3<f64>| (pose * model.center() - expected).norm();
                 line.off = Some((off(&single.camera_from_object), off(&line.fused)));

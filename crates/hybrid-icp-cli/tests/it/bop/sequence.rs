@@ -8,9 +8,9 @@ use std::path::Path;
 
 use crate::common::*;
 use hicp_io::LengthUnit;
-use hicp_io::bop::{Dataset, Scene, read_results};
+use hicp_io::bop::{Dataset, Rle, Scene, read_results};
 use hybrid_icp::core::{Isometry3, se3};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 const IMAGES: usize = 7;
 const SEQUENCE: &str = "bop sequence --dataset set --scene 1 --object 1 --output out.jsonl --init";
@@ -92,6 +92,7 @@ fn one_of_three_equal_cars_is_followed() {
             assert_eq!(line["instance"], instance, "{line}");
             assert!(line["single"]["mve"].as_f64().unwrap() < 0.4, "{line}");
             assert_eq!(line["covariance"].as_array().unwrap().len(), 36);
+            assert!(line["confidence"].as_f64().unwrap() > 0.5, "{line}");
             pose_of(&line["single"]);
             assert!(
                 (fused[im_id].translation_mm()[2] - line["cam_t_m2c"][2].as_f64().unwrap()).abs()
@@ -105,6 +106,37 @@ fn one_of_three_equal_cars_is_followed() {
         }
         assert_eq!(lines[6]["outcome"], "accepted");
         assert_improved(&pose_of(&lines[6]), &truths[6]);
+    }
+}
+
+#[test]
+fn detections_replace_the_ground_truth() {
+    let folder = cars();
+    let folder = folder.path();
+    sequence(folder, INITIAL, "").exits(0);
+    let expected = lines(folder);
+    let opened = scene(folder);
+    let mut detections = Vec::new();
+    for im_id in 0..IMAGES as u32 {
+        for instance in 0..3 {
+            let rle = Rle::of_mask(&opened.read_visible_mask(im_id, instance).unwrap());
+            detections.push(json!({
+                "scene_id": 1, "image_id": im_id, "category_id": 1, "score": 1, "bbox": [0, 0, 9, 9],
+                "segmentation": {"size": [480, 640], "counts": rle.counts()},
+            }));
+        }
+    }
+    let text = Value::from(detections).to_string();
+    fs::write(folder.join("found.json"), text).unwrap();
+    fs::remove_file(folder.join("set/test/000001/scene_gt.json")).unwrap();
+    let refused = sequence(folder, INITIAL, "").exits(1);
+    refused.complains(&["scene_gt.json does not exist", "--detections"]);
+    sequence(folder, INITIAL, "--detections found.json").exits(0);
+    for (line, expected) in lines(folder).iter().zip(&expected) {
+        for key in ["cam_t_m2c", "covariance", "confidence", "single"] {
+            assert_eq!(line[key], expected[key], "{key}");
+        }
+        assert_eq!(line.get("instance"), None);
     }
 }
 
@@ -238,5 +270,13 @@ fn missing_inputs_are_named() {
     let pose = pose_json(&followed(folder).1[4]);
     fs::write(folder.join("init.json"), pose.to_string()).unwrap();
     sequence(folder, "init.json", "--first 4").exits(0);
-    assert_eq!(lines(folder).len(), 3);
+    let of_json = lines(folder);
+    assert_eq!(of_json.len(), 3);
+    let pose = followed(folder).1[4];
+    let (t, q) = (1e3 * pose.translation.vector, pose.rotation.coords);
+    let text = format!("{} {} {} {} {} {} {}", t.x, t.y, t.z, q.x, q.y, q.z, q.w);
+    fs::write(folder.join("init.txt"), text).unwrap();
+    sequence(folder, "init.txt", "--first 4 --init-unit mm").exits(0);
+    let apart = off(&pose_of(&lines(folder)[2]), &pose_of(&of_json[2]));
+    assert!(apart.0 < 1e-6 && apart.1 < 1e-6, "{apart:?}");
 }
