@@ -34,8 +34,8 @@ pub(crate) struct ImageFiles {
     /// depth_scale for integers, meters for floating point.
     #[arg(long, value_name = "MM_PER_UNIT", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) depth_scale: Option<f64>,
-    /// The color image of --camera, of the mask's size: PNG or JPEG. It decides where depth alone
-    /// is ambiguous, and needs a mesh with colors or textures.
+    /// The color image of --camera, of the mask's size: PNG, JPEG or TIFF. It decides where depth
+    /// alone is ambiguous, and needs a mesh with colors or textures.
     #[arg(long, value_name = "FILE")]
     pub(crate) rgb: Option<PathBuf>,
     /// The camera, as JSON, YAML, XML, text or NPY: cam_K (nine numbers, row-major), fx, fy, cx and
@@ -52,10 +52,13 @@ pub(crate) struct ImageFiles {
         requires = "mask"
     )]
     pub(crate) depth_camera: Option<PathBuf>,
-    /// The pose of the depth camera in the frame of --camera, in a form of --init. Its translation
-    /// is in m, except for cam_t_m2c, which is in mm.
+    /// The pose of the depth camera in the frame of --camera, in a form of --init.
     #[arg(long, value_name = "FILE", requires = "depth_camera")]
     pub(crate) camera_from_depth: Option<PathBuf>,
+    /// Unit of the translation of --camera-from-depth: m, mm or cm. If not given: mm for cam_t_m2c,
+    /// m for all other forms.
+    #[arg(long, value_name = "UNIT", requires = "camera_from_depth")]
+    pub(crate) camera_from_depth_unit: Option<LengthUnit>,
 }
 
 impl ImageFiles {
@@ -272,11 +275,12 @@ impl Inputs {
             depth = distortion.undistort_depth(&of_depth.camera, &depth);
         }
         if let Some(path) = &files.camera_from_depth {
-            let pose = limits.read_pose(path, None)?.camera_from_object;
+            let pose = limits.read_pose(path, files.camera_from_depth_unit)?;
+            let pose = pose.camera_from_object;
             let meters = pose.translation.vector.norm();
             if meters > FARTHEST_CAMERAS_METERS {
                 warnings.push(format!(
-                    "{}: the cameras are {meters:.1} m apart: check that the translation is in m",
+                    "{}: the cameras are {meters:.1} m apart: check --camera-from-depth-unit",
                     path.display()
                 ));
             }

@@ -93,6 +93,7 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
             camera: header.text("camera")?.into(),
             depth_camera: header.get("depth-camera", "a string")?,
             camera_from_depth: header.get("camera-from-depth", "a string")?,
+            camera_from_depth_unit: header.unit("camera_from_depth_unit")?,
         },
         region: match header.line.get("bbox") {
             Some(_) => Region::Box(header.get("bbox", "four numbers")?),

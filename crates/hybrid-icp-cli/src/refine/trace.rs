@@ -72,8 +72,17 @@ pub(super) fn header(inputs: &Inputs, pipeline: &Pipeline) -> anyhow::Result<Val
         "set": pipeline.overrides,
         "model_unit": inputs.files.unit()?.to_string(),
     });
-    if let Some(unit) = inputs.init_unit {
-        line["init_unit"] = json!(unit.to_string());
+    let units = [
+        ("init_unit", inputs.init_unit),
+        (
+            "camera_from_depth_unit",
+            inputs.files.camera_from_depth_unit,
+        ),
+    ];
+    for (key, unit) in units {
+        if let Some(unit) = unit {
+            line[key] = json!(unit.to_string());
+        }
     }
     match &inputs.region {
         Region::Box(bbox) => line["bbox"] = json!(bbox),

@@ -68,7 +68,7 @@ pub(super) fn about_inputs(
     let (unit, model, depth) = (files.unit()?, files.model.display(), files.depth.display());
     let mask = inputs.mask_name();
     let (init, pose_unit) = match &inputs.init {
-        Some(path) => (path.display().to_string(), " and cam_t_m2c (mm)"),
+        Some(path) => (path.display().to_string(), " and --init-unit"),
         None => (String::new(), ""),
     };
     let in_words = |warning| match warning {
@@ -96,10 +96,16 @@ pub(super) fn about_facts(
     observation: &Observation,
     inputs: &Inputs,
 ) -> Vec<String> {
-    let (model, mask) = (inputs.files.model.display(), inputs.mask_name());
+    let (model, depth) = (inputs.files.model.display(), inputs.files.depth.display());
+    let mask = inputs.mask_name();
     let facts = Diagnosis::facts(object, observation).into_iter();
     let in_words = |fault: Fault| match fault {
-        Fault::MaskEmpty => Some(format!("{mask}: {fault}: {}", fault.fix())),
+        Fault::MaskEmpty => Some(match inputs.region {
+            Region::Mask(..) => format!("{mask}: {fault}: {}", fault.fix()),
+            Region::Box(_) => format!(
+                "{mask}: nothing but a plane is measured in the box, or nothing at all: check the box and {depth}"
+            ),
+        }),
         Fault::MeshInsideOut => Some(format!("{model}: {fault}: {}", fault.fix())),
         _ => None,
     };

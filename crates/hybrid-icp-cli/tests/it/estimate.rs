@@ -5,7 +5,7 @@ use crate::world::*;
 use hicp_io::bop::{ResultRow, Rle, read_results};
 use hicp_io::{LengthUnit, read_mask_png};
 use hicp_sim::Household;
-use hybrid_icp::core::Isometry3;
+use hybrid_icp::core::{DepthImage, Isometry3};
 use hybrid_icp::score::ModelPoints;
 use serde_json::{Value, json};
 
@@ -82,6 +82,12 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
             .complains(&["--model-unit m"]);
         assert_eq!(told.err.contains("doctor"), is_advised, "{}", told.err);
     }
+    let dropped = DepthImage::from_meters(320, 240, vec![0.0; 320 * 240]).unwrap();
+    hicp_io::write_depth_png(scene.path("depth.png"), &dropped, 0.1).unwrap();
+    let parts = ["--bbox: nothing but a plane", "check the box and depth.png"];
+    estimate(&scene, "--bbox 60,30,200,180")
+        .exits(0)
+        .complains(&parts);
     for bbox in ["320,0,9,9", "-9,0,9,9", "0,240,9,9"] {
         estimate(&scene, &format!("--bbox {bbox}"))
             .exits(1)

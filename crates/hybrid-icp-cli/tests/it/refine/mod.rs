@@ -187,7 +187,10 @@ fn units_that_do_not_match_are_warned_of() {
     let scene = Scene::new();
     let far = Isometry3::translation(0.0, 0.0, 1e300);
     scene.write("init.json", pose_json(&far).to_string());
-    warned(&scene, &["warning: depth.png", "1.000e300 m", "cam_t_m2c"]);
+    warned(
+        &scene,
+        &["warning: depth.png", "1.000e300 m", "--init-unit"],
+    );
     let scene = Scene::new().with("--model-unit", "mm");
     warned(
         &scene,
