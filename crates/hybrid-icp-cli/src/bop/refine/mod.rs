@@ -27,7 +27,8 @@ use crate::outputs::{self, Files};
 ///
 /// The output has the same rows in the same order. Rows that cannot be refined keep their numbers
 /// and are counted by reason at the end. The time column has the seconds spent on all rows of the
-/// image, added to the time in the input.
+/// image, added to the time in the input. If that is unknown (-1), it is the time of the refinement
+/// alone.
 ///
 /// A row is refined in one of its object's visible masks (mask_visib), or in one of the
 /// segmentations of a detections file. It uses the mask that the silhouette at its pose overlaps
