@@ -9,6 +9,8 @@ use super::pixels;
 use crate::error::IoError;
 use crate::format::{self, Format};
 use crate::limits::ReadLimits;
+#[cfg(feature = "tiff")]
+use crate::number::byte;
 
 /// Reads a color image from a PNG file of any pixel type, or from a JPEG or TIFF file.
 ///
@@ -70,13 +72,11 @@ fn of_raster(path: &Path, image: &super::raster::Raster) -> Result<ColorImage, I
             expected,
         ));
     };
-    let scale = 255.0 / (2.0_f32.powi(bits.cast_signed()) - 1.0);
-    // A float converts to the nearest byte that it is within.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let byte = |sample: f32| (scale * sample) as u8;
+    let scale = 255.0 / (2.0_f64.powi(bits.cast_signed()) - 1.0);
+    let channel = |sample: f32| byte(scale * f64::from(sample));
     let colors = image.channels - usize::from(image.has_alpha);
     let pixels = image.samples.chunks_exact(image.channels);
-    let pixels = pixels.map(|p| [p[0], p[colors / 2], p[colors - 1]].map(byte));
+    let pixels = pixels.map(|p| [p[0], p[colors / 2], p[colors - 1]].map(channel));
     let image = ColorImage::new(image.width, image.height, pixels.collect());
     image.map_err(|error| IoError::unusable(path, "color image", error))
 }
