@@ -22,7 +22,7 @@ pub(crate) struct Array<'a> {
     /// The lengths of its axes.
     pub(crate) shape: Vec<usize>,
     number: NumberType,
-    /// Whether the numbers are truth values.
+    /// `true` if the numbers are truth values.
     is_bool: bool,
     big_endian: bool,
     /// Whether the first index varies fastest.

@@ -54,7 +54,8 @@ use crate::session::Session;
 ///             if iteration > 0 {
 ///                 outcome = Outcome::refined(pose, ended);
 ///             }
-///             let evaluation = Evaluation { n_pairs: self.pairs.len(), mean_loss: step.mean_loss };
+///             let (n_pairs, mean_loss) = (self.pairs.len(), step.mean_loss);
+///             let evaluation = Evaluation { n_pairs, mean_loss };
 ///             let event = IterationEvent::new(iteration, &pose, evaluation, &step.increment);
 ///             if session.observer.on_iteration(&event).is_break() {
 ///                 break;

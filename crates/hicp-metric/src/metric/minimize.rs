@@ -15,8 +15,8 @@ use crate::system::normal_equations::NormalEquations;
 /// A decorator that does not change the system, for example because it counts or logs, must
 /// override `minimize`, too, and call that of the wrapped metric. Otherwise one Gauss–Newton step
 /// replaces its closed form or solver ([`PointToPoint`](crate::PointToPoint),
-/// [`LevenbergMarquardt`](crate::LevenbergMarquardt)). `hicp_testkit::check_metric_forwards` detects
-/// this.
+/// [`LevenbergMarquardt`](crate::LevenbergMarquardt)). `hicp_testkit::check_metric_forwards`
+/// detects this.
 ///
 /// It is pure: equal iterations and pairs give equal results, and `&mut self` is scratch. A metric
 /// that depends on the pose reads it from [`Correspondences::camera_from_object`]. The index of the
@@ -53,7 +53,8 @@ use crate::system::normal_equations::NormalEquations;
 /// impl Whitened {
 ///     fn at(&self, pairs: &Correspondences) -> WhitenedAt<'_> {
 ///         let rotation = pairs.camera_from_object().rotation.inverse();
-///         WhitenedAt { roots: &self.0, source_from_target: *rotation.to_rotation_matrix().matrix() }
+///         let source_from_target = *rotation.to_rotation_matrix().matrix();
+///         WhitenedAt { roots: &self.0, source_from_target }
 ///     }
 /// }
 ///
@@ -61,7 +62,11 @@ use crate::system::normal_equations::NormalEquations;
 ///     fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
 ///         None
 ///     }
-///     fn system(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<NormalEquations> {
+///     fn system(
+///         &mut self,
+///         _: &Iteration<'_>,
+///         pairs: &Correspondences,
+///     ) -> Option<NormalEquations> {
 ///         self.at(pairs).linearize_all(pairs)
 ///     }
 ///     fn mean_loss(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
