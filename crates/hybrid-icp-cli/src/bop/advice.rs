@@ -2,22 +2,15 @@
 
 use hybrid_icp::Warning;
 
-/// Returns the files to check for the cause; `poses` is the option that names the poses, if any.
+/// Returns the files to check for the cause; `poses` says how to check the poses, if any.
 ///
 /// Returns `None` for warnings about models and about single poses, which need no image.
 pub(crate) fn advice(warning: &Warning, poses: Option<&str>) -> Option<String> {
-    let scale = "check depth_scale in scene_camera.json";
-    let models = match poses {
-        Some(poses) => format!("models and {poses}"),
-        None => "models".to_owned(),
-    };
+    let poses = poses.map_or(String::new(), |poses| format!(", and {poses}"));
     match warning {
-        Warning::NoDepth => Some(scale.to_owned()),
-        Warning::Depth { .. } => Some(match poses {
-            Some(poses) => format!("{scale}, and that {poses} is in mm"),
-            None => scale.to_owned(),
-        }),
-        Warning::Mask { .. } => Some(format!("check that {models} are in mm")),
+        Warning::NoDepth => Some("check depth_scale in scene_camera.json".to_owned()),
+        Warning::Depth { .. } => Some(format!("check depth_scale in scene_camera.json{poses}")),
+        Warning::Mask { .. } => Some(format!("check that models are in mm{poses}")),
         Warning::Sliver { .. } => {
             Some("check that models are in mm, and that masks show the object".to_owned())
         }

@@ -15,6 +15,7 @@ use super::models;
 use super::options::DatasetOptions;
 use crate::limits::limits;
 use crate::outputs::Files;
+use crate::terminal::warn;
 
 /// The options of a command that follows one object through a scene.
 #[derive(Debug, Args)]
@@ -95,16 +96,45 @@ impl FollowOptions {
         Ok(images)
     }
 
+    /// Returns whether `--init` is a result file, which is in mm.
+    fn is_results(&self) -> bool {
+        self.init.extension().is_some_and(|ending| ending == "csv")
+    }
+
+    /// Returns the advice to check the unit of `--init`.
+    pub(super) fn check_unit(&self) -> &'static str {
+        match self.is_results() {
+            true => "that --init is in mm",
+            false => "--init-unit",
+        }
+    }
+
+    /// Warns that all poses are guesses; `failed` says what happened in none of the images.
+    pub(super) fn distrust(&self, images: usize, failed: &str) {
+        warn(format_args!(
+            "{}: {failed} in none of its {images} images: do not trust its poses, and check {}, and {}",
+            self.output.display(),
+            self.init.display(),
+            self.check_unit()
+        ));
+    }
+
     /// Reads the pose in the first image from a pose file or a result file (`.csv`).
     ///
     /// Of a result file, returns the row with the highest score for the image.
     pub(super) fn initial_pose(&self, im_id: u32) -> anyhow::Result<Isometry3<f64>> {
         let path = &self.init;
-        if path.extension().is_none_or(|extension| extension != "csv") {
+        if !self.is_results() {
             let pose = limits()
                 .read_pose(path, self.init_unit)
                 .context("cannot read --init")?;
             return Ok(pose.camera_from_object);
+        }
+        if let Some(unit) = self.init_unit {
+            bail!(
+                "--init-unit {unit} does not apply to {}: result files are in mm",
+                path.display()
+            );
         }
         let (scene_id, obj_id) = (self.scene, self.object);
         let place = (scene_id, im_id, obj_id);

@@ -88,6 +88,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         lines.len(),
         summarize(&lines),
     ))?;
+    let tracking = |line: &Line| line.tracked.state == TrackState::Tracking;
+    if !lines.iter().any(tracking) {
+        follow.distrust(lines.len(), "the object is tracked");
+    }
     let damaged = faults::report(faults.iter(), [].iter());
     if damaged > 0 {
         bail!(

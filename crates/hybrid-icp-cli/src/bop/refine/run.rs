@@ -66,7 +66,7 @@ impl RefineJob<'_> {
         for result in &results {
             result.enter(&mut rows, self.rescore, self.timed);
         }
-        let poses = (!self.estimates()).then_some("--results");
+        let poses = (!self.estimates()).then_some("that --results is in mm");
         let images = warnings::about_images(&results, &rows, poses);
         // The output may replace the input. Write it last, so that a run that fails before can be
         // continued.

@@ -36,7 +36,7 @@ type OfScene = (u32, usize, usize, Warning);
 
 /// Returns warnings about flaws in most images of an object in a scene.
 ///
-/// Each scene has its own files. `poses` is the option that names the poses, if there are any.
+/// Each scene has its own files. `poses` says how to check the poses, if there are any.
 /// If only a few images have the flaw, their poses are wrong, and the files are right.
 pub(super) fn about_images(
     results: &[FrameResult],

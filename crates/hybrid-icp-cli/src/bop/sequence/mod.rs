@@ -145,20 +145,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for warning in warnings {
         // One warning about the same number is enough.
         if diameter.is_none() || !is_about_diameter(&warning) {
-            let advice = advice(&warning, Some("--init")).unwrap_or_else(|| match warning {
-                Warning::BehindCamera { .. } => format!("check {}", follow.init.display()),
-                _ => format!("check that {} is in mm", models_dir.display()),
-            });
+            let advice =
+                advice(&warning, Some(follow.check_unit())).unwrap_or_else(|| match warning {
+                    Warning::BehindCamera { .. } => format!("check {}", follow.init.display()),
+                    _ => format!("check that {} is in mm", models_dir.display()),
+                });
             warn(format_args!(
                 "object {object} in image {im_id} of scene {scene_id}: {warning}: {advice}"
             ));
         }
     }
     if !lines.iter().any(|line| line.outcome == "accepted") {
-        warn(format_args!(
-            "{output}: none of its {} images was accepted: do not trust its poses",
-            lines.len()
-        ));
+        follow.distrust(lines.len(), "an estimate is accepted");
     }
     let damaged = faults::report(tracker.faults.iter(), [].iter());
     if damaged > 0 {

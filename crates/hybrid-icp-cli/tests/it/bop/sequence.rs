@@ -156,7 +156,11 @@ fn impossible_scales_and_sizes_are_warned_of() {
         fs::write(&cameras, value.to_string()).unwrap();
         sequence(folder, INITIAL, "").exits(0)
     };
-    let none = "warning: out.jsonl: none of its 7 images was accepted: do not trust its poses\n";
+    let none = format!(
+        "warning: out.jsonl: an estimate is accepted in none of its 7 images: do not trust its poses, \
+         and check {INITIAL}, and that --init is in mm\n"
+    );
+    let none = none.as_str();
     assert_eq!(scaled(2.0).err, none);
     let told = scaled(10.0).err;
     let begin = "warning: object 1 in image 0 of scene 1: the median depth inside the mask is ";
@@ -166,6 +170,14 @@ fn impossible_scales_and_sizes_are_warned_of() {
         "{told}"
     );
     assert_eq!(told.lines().count(), 2, "{told}");
+    // A pose file has its own unit.
+    fs::write(
+        folder.join("init.json"),
+        pose_json(&followed(folder).1[0]).to_string(),
+    )
+    .unwrap();
+    let told = sequence(folder, "init.json", "").exits(0);
+    told.complains(&["check depth_scale in scene_camera.json, and --init-unit\n"]);
 
     fs::write(&cameras, &text).unwrap();
     let info = folder.join("set/models/models_info.json");

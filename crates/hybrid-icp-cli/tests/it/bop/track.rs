@@ -99,12 +99,26 @@ fn images_that_cannot_be_read_are_reported_and_have_a_predicted_pose() {
 }
 
 #[test]
+fn a_start_far_from_the_object_is_warned_of() {
+    let folder = moving(2);
+    let init = read_results(folder.path().join("set/initial_synthetic-test.csv")).unwrap();
+    let pose = pose_json(&init[0].camera_from_object());
+    fs::write(folder.path().join("init.json"), pose.to_string()).unwrap();
+    let words = TRACK.replace("set/initial_synthetic-test.csv", "init.json --init-unit m");
+    run(folder.path(), words.split(' ')).exits(0).complains(&[
+        "tracked in none of its 2 images",
+        "check init.json, and --init-unit",
+    ]);
+}
+
+#[test]
 fn wrong_inputs_of_tracking_are_refused() {
     let folder = moving(2);
     for (options, expected) in [
         ("--first 7", "--first 7 is not an image"),
         ("--fps 0", "--fps"),
         ("--fps nan", "--fps"),
+        ("--init-unit m", "result files are in mm"),
     ] {
         let words = format!("{TRACK} {options}");
         let told = run(folder.path(), words.split(' '));

@@ -291,7 +291,7 @@ fn a_model_of_a_tenth_of_its_size_is_detected_by_the_masks() {
         run.err
     );
     assert!(
-        told[0].contains("check that models and --results are in mm"),
+        told[0].contains("check that models are in mm, and that --results is in mm"),
         "{}",
         run.err
     );
