@@ -115,7 +115,12 @@ impl DepthImage {
         Raster::new(width, height, pixels).map(Self)
     }
 
-    /// Creates a depth image from the 16-bit units of a sensor, row by row; 0 means missing.
+    /// The largest 16-bit unit. Sensors write it where they measured nothing, or too far away.
+    pub const SATURATED: u16 = u16::MAX;
+
+    /// Creates a depth image from the 16-bit units of a sensor, row by row.
+    ///
+    /// 0 and [`SATURATED`](Self::SATURATED) mean missing.
     ///
     /// `meters_per_unit` is the value of one unit: 0.001 for millimeters, BOP's `depth_scale`
     /// divided by 1000.
@@ -126,8 +131,8 @@ impl DepthImage {
     ///
     /// ```
     /// # fn main() -> Result<(), hicp_core::ImageError> {
-    /// let depth = hicp_core::DepthImage::from_u16(2, 1, &[0, 1500], 0.001)?;
-    /// assert_eq!(depth.pixels(), [0.0, 1.5]);
+    /// let depth = hicp_core::DepthImage::from_u16(3, 1, &[0, 1500, 65535], 0.001)?;
+    /// assert_eq!(depth.pixels(), [0.0, 1.5, 0.0]);
     /// # Ok(()) }
     /// ```
     pub fn from_u16(
@@ -137,9 +142,10 @@ impl DepthImage {
         meters_per_unit: f64,
     ) -> Result<Self, ImageError> {
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-        let meters = units
-            .iter()
-            .map(|z| (f64::from(*z) * meters_per_unit) as f32);
+        let meters = units.iter().map(|z| match *z {
+            Self::SATURATED => 0.0,
+            z => (f64::from(z) * meters_per_unit) as f32,
+        });
         Self::collect(width, height, meters)
     }
 

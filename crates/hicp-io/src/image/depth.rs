@@ -12,7 +12,7 @@ use crate::error::IoError;
 use crate::limits::ReadLimits;
 use crate::number::{narrow, whole};
 
-/// Reads a depth image from a 16-bit gray PNG file; 0 means missing.
+/// Reads a depth image from a 16-bit gray PNG file; 0 and 65535 mean missing.
 ///
 /// `millimeters_per_unit` is the depth of one unit, which BOP calls `depth_scale`. Depths above
 /// `hicp_core::MAX_DEPTH_METERS` become missing.
@@ -48,9 +48,9 @@ impl ReadLimits {
         let path = path.as_ref();
         check_scale(path, millimeters_per_unit)?;
         let image = pixels::read(self, path, Transformations::IDENTITY, true)?;
-        let to_meters = |bytes: &[u8]| {
-            let units = u16::from_be_bytes([bytes[0], bytes[1]]);
-            narrow(f64::from(units) * millimeters_per_unit / 1000.0)
+        let to_meters = |bytes: &[u8]| match u16::from_be_bytes([bytes[0], bytes[1]]) {
+            DepthImage::SATURATED => 0.0,
+            units => narrow(f64::from(units) * millimeters_per_unit / 1000.0),
         };
         let meters = image.bytes.chunks_exact(2).map(to_meters).collect();
         let depth = DepthImage::from_meters(image.width, image.height, meters);
@@ -66,9 +66,10 @@ const EXPECTED: &str = "a depth image as PNG, TIFF, NPY, NPZ, EXR, PGM or PFM";
 /// - PNG, PGM and TIFF: 16-bit gray.
 /// - TIFF, NPY, NPZ, EXR and PFM: floating point of 16, 32 or 64 bits; NPY and NPZ also integers.
 ///
-/// 0, NaN, infinity and negative numbers mean missing. `millimeters_per_unit` is the depth of one
-/// unit. `None` means that the numbers are meters, which only floating point can be. EXR files need
-/// a channel `Z`, or a single channel. NPZ archives need a single array, or one named `depth`.
+/// 0, NaN, infinity and negative numbers mean missing, and so does 65535 in 16 bits.
+/// `millimeters_per_unit` is the depth of one unit. `None` means that the numbers are meters, which
+/// only floating point can be. EXR files need a channel `Z`, or a single channel. NPZ archives need
+/// a single array, or one named `depth`.
 ///
 /// # Errors
 ///
@@ -121,7 +122,11 @@ impl RawDepth {
             }
         };
         check_scale(path, millimeters)?;
-        let meters = |units: f32| narrow(f64::from(units) * millimeters / 1000.0);
+        let is_16_bit = self.raster.integer_bits == Some(16);
+        let meters = |units: f32| match is_16_bit && units == f32::from(DepthImage::SATURATED) {
+            true => 0.0,
+            false => narrow(f64::from(units) * millimeters / 1000.0),
+        };
         let depth = DepthImage::collect(width, height, self.raster.samples.into_iter().map(meters));
         depth.map_err(|error| IoError::unusable(path, "depth image", error))
     }
@@ -225,7 +230,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn depths_survive_writing_and_reading(
-            units in prop::collection::vec(any::<u16>(), 12),
+            units in prop::collection::vec(prop_oneof![9 => any::<u16>(), 1 => Just(u16::MAX)], 12),
             scale in prop::sample::select(vec![0.1, 1.0, 0.125, 0.05, 10.0]),
         ) {
             let dir = tempfile::tempdir().unwrap();
@@ -235,9 +240,11 @@ mod tests {
             let depth = read_depth_png(&path, scale).unwrap();
             write_depth_png(&path, &depth, scale).unwrap();
             let again = read_depth_png(&path, scale).unwrap();
+            prop_assert_eq!(&read_depth(&path, Some(scale)).unwrap(), &depth);
             prop_assert_eq!(pixels::read_png_size(&path).unwrap(), (4, 3));
             prop_assert_eq!(&again, &depth);
             for (meters, unit) in depth.pixels().iter().zip(&units) {
+                let unit = if *unit == u16::MAX { &0 } else { unit };
                 prop_assert!((f64::from(*meters) * 1000.0 - f64::from(*unit) * scale).abs() < 0.05);
             }
         }

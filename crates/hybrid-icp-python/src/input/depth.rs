@@ -208,7 +208,11 @@ fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
             let (millimeters, advice) = (millimeters(scale)?, advice_on(scale));
             let meters = |z: f64| narrow(z * millimeters / 1000.0);
             if let Ok(units) = value.extract::<PyReadonlyArray2<'_, u16>>() {
-                return convert(&units.as_array(), |z| meters(f64::from(z)), &advice);
+                let meters = |z: u16| match z {
+                    DepthImage::SATURATED => 0.0,
+                    z => meters(f64::from(z)),
+                };
+                return convert(&units.as_array(), meters, &advice);
             }
             convert(&any()?.as_array(), meters, &advice)
         }
