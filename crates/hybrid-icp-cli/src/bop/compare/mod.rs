@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 use clap::Args;
 use hicp_bop::Rescore;
+use hicp_experiments::Table;
 
 use self::report::Comparison;
 use super::eval::{self, DELTA_MM, EvalJob};
@@ -20,7 +21,7 @@ use super::refine::{MaskOptions, RefineJob, RowOptions};
 use crate::choice::{Pipeline, Source};
 use crate::limits::limits;
 use crate::outputs::{Files, journal_of};
-use crate::terminal::say;
+use crate::terminal::{say, table};
 
 /// Refine a result file with several pipelines, and compare them by their evaluations.
 ///
@@ -127,17 +128,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let path = out.join(format!("{COMPARISON}.{ending}"));
         hicp_io::write_atomically(path, |writer| writer.write_all(text.as_bytes()))?;
     }
+    let Table { head, rows, .. } = comparison.overall();
+    let lines: Vec<_> = std::iter::once(head).chain(rows).collect();
     let page = out.join(format!("{COMPARISON}.html"));
     say(format_args!(
-        "\n{}\n{}",
-        comparison.overall().markdown(),
+        "{}\n\n{} has the tables by object",
+        table(&lines, 1),
         page.display()
     ))
 }
 
 impl Arguments {
     fn evaluate(&self, name: &str, results: &Path) -> anyhow::Result<eval::Report> {
-        say(format_args!("\n{name}:"))?;
         let json = self.out.join(format!("{name}.json"));
         let job = EvalJob {
             dataset: self.dataset.clone(),
@@ -149,8 +151,11 @@ impl Arguments {
             errors: None,
             calibration: false,
             threads: self.threads,
+            quiet: true,
         };
-        job.run()
+        let report = job.run()?;
+        say(format_args!("{name}: AR {:.3}\n", report.all.ar))?;
+        Ok(report)
     }
 
     /// Checks that every file of the comparison can be written, and that none replaces an input.

@@ -55,6 +55,9 @@ pub(crate) struct EvalJob {
     pub(crate) calibration: bool,
     #[command(flatten)]
     pub(crate) threads: ThreadOptions,
+    /// If `true`, prints no table.
+    #[arg(skip)]
+    pub(crate) quiet: bool,
 }
 
 impl EvalJob {
@@ -150,7 +153,7 @@ impl EvalJob {
             hicp_io::write_atomically(path, |file| writeln!(file, "{text}"))?;
         }
         let is_empty = report.all.targets == 0;
-        if !is_empty {
+        if !is_empty && !self.quiet {
             say(report.table())?;
         }
         let faults = judged.iter().flat_map(|image| &image.faults);
