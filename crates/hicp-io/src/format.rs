@@ -121,6 +121,10 @@ impl Format {
             }
             Gzip => "decompress it first with `gunzip FILE`",
             Hdf5 => "np.save(\"array.npy\", h5py.File(FILE)[KEY][()]) in Python converts it",
+            Json => {
+                "a polygon or a run-length code of COCO is a mask by \
+                 np.save(\"mask.npy\", coco.annToMask(annotation)) in Python"
+            }
             Matlab => "np.save(\"array.npy\", scipy.io.loadmat(FILE)[KEY]) in Python converts it",
             Pclzf => {
                 "save PNG, for example with PCL's pcl_convert_pcd_ascii_binary after a grab as PCD"

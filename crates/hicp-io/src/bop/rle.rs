@@ -202,8 +202,8 @@ impl<'de> Deserialize<'de> for Rle {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let code = Value::deserialize(deserializer)?;
         let (Some(size), Some(counts)) = (code.get("size"), code.get("counts")) else {
-            let text =
-                "another kind of segmentation, expected a run-length code with `size` and `counts`";
+            let text = "another kind of segmentation, expected a run-length code with `size` and \
+                        `counts`, such as that of annToRLE of pycocotools";
             return Err(D::Error::custom(text));
         };
         let [height, width] = Deserialize::deserialize(size).map_err(D::Error::custom)?;

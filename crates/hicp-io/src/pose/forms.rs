@@ -12,8 +12,8 @@ use crate::limits::ReadLimits;
 use crate::unit::LengthUnit;
 
 /// The supported forms, for messages.
-const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, a translation and a quaternion of \
-                        stated order, or a TUM line (t x y z qx qy qz qw)";
+const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, t and a quaternion of stated order \
+                        (quaternion_xyzw or quaternion_wxyz), or a TUM line (t x y z qx qy qz qw)";
 
 /// Reads a pose in any common form, as JSON, YAML, XML, text or NPY.
 ///
