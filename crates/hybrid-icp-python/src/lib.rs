@@ -49,7 +49,7 @@ mod native {
     #[pymodule_export]
     use crate::input::model::PyModel;
     #[pymodule_export]
-    use crate::input::observation::PyObservation;
+    use crate::input::observation::{PyObservation, mask_in_box};
     #[pymodule_export]
     use crate::pipeline::PyPipeline;
     #[pymodule_export]

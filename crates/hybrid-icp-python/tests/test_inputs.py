@@ -152,6 +152,8 @@ def test_masks_that_do_not_fit_the_object_cause_a_warning(scene):
         (lambda: hi.Fuser("averag"), 'no fusion method is named "averag"'),
         (lambda: hi.PoseEstimate(np.eye(4), -np.eye(6)), "covariance has the eigenvalue"),
         (lambda: hi.fuse([]), "no estimate to fuse"),
+        (lambda: hi.mask_in_box(WALL, CAMERA, [1, 2, 3]), r"bbox .*expected four numbers"),
+        (lambda: hi.mask_in_box(WALL, CAMERA, [64, 0, 9, 9]), r"bbox is \(64, .* in a 64x48 image"),
     ],
 )
 def test_other_errors_name_the_value(make, message):
@@ -292,8 +294,12 @@ def test_files_of_numpy_are_read(tmp_path):
     meters = np.linspace(0.5, 1.5, 48 * 64, dtype=np.float32).reshape(48, 64)
     np.save(tmp_path / "depth.npy", meters)
     assert np.array_equal(hi.read_depth(tmp_path / "depth.npy"), meters)
-    np.save(tmp_path / "units.npy", np.full((48, 64), 800, np.uint16))
-    assert (hi.read_depth(tmp_path / "units.npy", scale=0.001) == np.float32(0.8)).all()
+    units = np.full((48, 64), 800, np.uint16)
+    units[0] = 65535  # Saturated, which means missing.
+    np.save(tmp_path / "units.npy", units)
+    expected = np.where(units == 800, np.float32(0.8), 0)
+    assert np.array_equal(hi.read_depth(tmp_path / "units.npy", scale=0.001), expected)
+    assert np.array_equal(hi.DepthImage(units, scale=0.001).to_numpy(), expected)
     with pytest.raises(hi.FileError, match="integers"):
         hi.read_depth(tmp_path / "units.npy")
     labels = np.tile(np.arange(4, dtype=np.uint8), (48, 16))

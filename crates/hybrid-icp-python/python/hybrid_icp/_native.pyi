@@ -6,7 +6,7 @@ from typing import Any, Literal, Protocol, TypedDict, Union, final
 import numpy as np
 import numpy.typing as npt
 from ._results import Alignment, DecisionEvent, IterationEvent, RegimeEvent, Result, SequentialStep, StageEvent, Tracked
-__all__ = ['Camera', 'DatasetRefiner', 'DepthImage', 'Fuser', 'Model', 'Observation', 'Pipeline', 'PoseEstimate', 'SequentialEstimator', 'Tracker', 'add', 'adi', 'align', 'fuse', 'mspd', 'mssd', 'mve', 'parts', 'point_to_plane_step', 'point_to_point_step', 'read_cloud', 'read_depth', 'read_depth_png', 'read_images', 'read_mask', 'read_mask_png', 'read_pose', 'render_depth', 'result_header', 'run_program', 'vsd']
+__all__ = ['Camera', 'DatasetRefiner', 'DepthImage', 'Fuser', 'Model', 'Observation', 'Pipeline', 'PoseEstimate', 'SequentialEstimator', 'Tracker', 'add', 'adi', 'align', 'fuse', 'mask_in_box', 'mspd', 'mssd', 'mve', 'parts', 'point_to_plane_step', 'point_to_point_step', 'read_cloud', 'read_depth', 'read_depth_png', 'read_images', 'read_mask', 'read_mask_png', 'read_pose', 'render_depth', 'result_header', 'run_program', 'vsd']
 _Array = npt.NDArray[np.float64]
 _Unit = Literal['m', 'mm', 'cm']
 _Axes = Union[npt.ArrayLike, Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]]
@@ -185,7 +185,8 @@ class DepthImage:
     ----------
     depth : numpy.ndarray, shape (H, W)
         Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
-        more bits with `scale`. Pixels without a measurement are 0, negative or NaN.
+        more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
+        uint16.
     scale : float, optional
         Meters per unit of an image of integers, such as 0.001; BOP's `depth_scale` divided by 1000.
 
@@ -446,8 +447,8 @@ class Observation:
     ----------
     depth : DepthImage or numpy.ndarray, shape (H, W)
         Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
-        more bits with `scale`. Pixels without a measurement are 0, negative or NaN. A `DepthImage`
-        is shared, not copied.
+        more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
+        uint16. A `DepthImage` is shared, not copied.
     mask : numpy.ndarray of bool or uint8, shape (H, W), or None
         Nonzero on the object. `None` selects every pixel. Other integers must be 0 and 1, or 0 and
         255.
@@ -1328,6 +1329,44 @@ def mve(model: Model, observation: Observation, T_co: npt.ArrayLike, *, occlusio
 
 def run_program(words: Sequence[str]) -> int:
     """Runs the program with the words of its command line, and returns the exit code."""
+
+def mask_in_box(depth: DepthImage | _Depth, camera: Camera, bbox: npt.ArrayLike, *, scale: float | None=None) -> npt.NDArray[np.bool_]:
+    """Returns the measured pixels of a box that are in front of the plane around it, such as a table.
+
+    It replaces the mask of a segmentation if a detector gives only a box.
+
+    Parameters
+    ----------
+    depth : DepthImage or numpy.ndarray, shape (H, W)
+        Meters, or integers with `scale`, as for `Observation`.
+    camera : Camera
+        A camera for images of this size.
+    bbox : array_like, shape (4,)
+        x and y of the left upper corner, width and height, pixels. A box of two corners
+        (x1, y1, x2, y2) is (x1, y1, x2 - x1, y2 - y1).
+    scale : float, optional
+        Meters per unit of an image of integers, such as 0.001.
+
+    Returns
+    -------
+    numpy.ndarray, shape (H, W), bool
+        The mask, for `Observation`. If there is no plane, all measured pixels of the box.
+
+    Raises
+    ------
+    InputError
+        If a shape, dtype or unit is wrong, or the box has no pixel in the image.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hybrid_icp import Camera, mask_in_box
+    >>> depth = np.full((64, 64), 0.8, np.float32)
+    >>> depth[22:42, 22:42] = 0.6  # An object in front of a wall.
+    >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
+    >>> int(mask_in_box(depth, camera, (20, 20, 25, 25)).sum())
+    400
+    """
 
 def render_depth(model: Model, camera: Camera, T_co: npt.ArrayLike) -> npt.NDArray[np.float32]:
     """Renders the depth of a model at a pose.

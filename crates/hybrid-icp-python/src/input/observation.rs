@@ -17,6 +17,86 @@ use crate::input::model::PyModel;
 /// The positional and the named arguments that create an observation again.
 type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict>);
 
+/// Checks that a depth image has the size of its camera.
+fn check_size(
+    camera: &PinholeCamera,
+    depth: &Bound<'_, PyAny>,
+    image: &DepthImage,
+) -> PyResult<()> {
+    if (camera.width(), camera.height()) == (image.width(), image.height()) {
+        return Ok(());
+    }
+    Err(InputError::new_err(format!(
+        "camera is for {}x{} images but depth is {} with shape ({}, {}), expected shape ({}, {})",
+        camera.width(),
+        camera.height(),
+        array::kind(depth),
+        image.height(),
+        image.width(),
+        camera.height(),
+        camera.width()
+    )))
+}
+
+/// Returns the measured pixels of a box that are in front of the plane around it, such as a table.
+///
+/// It replaces the mask of a segmentation if a detector gives only a box.
+///
+/// Parameters
+/// ----------
+/// depth : DepthImage or numpy.ndarray, shape (H, W)
+///     Meters, or integers with `scale`, as for `Observation`.
+/// camera : Camera
+///     A camera for images of this size.
+/// bbox : array_like, shape (4,)
+///     x and y of the left upper corner, width and height, pixels. A box of two corners
+///     (x1, y1, x2, y2) is (x1, y1, x2 - x1, y2 - y1).
+/// scale : float, optional
+///     Meters per unit of an image of integers, such as 0.001.
+///
+/// Returns
+/// -------
+/// numpy.ndarray, shape (H, W), bool
+///     The mask, for `Observation`. If there is no plane, all measured pixels of the box.
+///
+/// Raises
+/// ------
+/// InputError
+///     If a shape, dtype or unit is wrong, or the box has no pixel in the image.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from hybrid_icp import Camera, mask_in_box
+/// >>> depth = np.full((64, 64), 0.8, np.float32)
+/// >>> depth[22:42, 22:42] = 0.6  # An object in front of a wall.
+/// >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
+/// >>> int(mask_in_box(depth, camera, (20, 20, 25, 25)).sum())
+/// 400
+#[pyfunction]
+#[pyo3(signature = (depth, camera, bbox, *, scale = None))]
+pub(crate) fn mask_in_box(
+    py: Python<'_>,
+    depth: &Bound<'_, PyAny>,
+    camera: PyCamera,
+    bbox: &Bound<'_, PyAny>,
+    scale: Option<f64>,
+) -> PyResult<Matrix<bool>> {
+    let (image, camera) = (depth::shared(depth, scale)?, camera.0);
+    check_size(&camera, depth, &image)?;
+    let expected = "four numbers: x, y, width and height of a box in the image, pixels";
+    let bbox = array::numbers::<f64>(bbox, &[Some(4)], "bbox", expected)?.0;
+    let [x, y, w, h] = [bbox[0], bbox[1], bbox[2], bbox[3]];
+    let (right, low) = (f64::from(camera.width()), f64::from(camera.height()));
+    let has_pixels = w >= 1.0 && h >= 1.0 && x + w > 0.0 && y + h > 0.0 && x < right && y < low;
+    if !has_pixels {
+        let found = format!("bbox is ({x}, {y}, {w}, {h}) in a {right}x{low} image");
+        return Err(InputError::new_err(format!("{found}, expected {expected}")));
+    }
+    let mask = py.detach(|| hybrid_icp::mask_in_box(&image, &camera, [x, y, w, h]));
+    Ok(depth::image(mask.width(), mask.pixels()))
+}
+
 /// A segmented depth image, for refining poses.
 ///
 /// It is immutable, and hypotheses and threads can share it. Each array is copied once, so later
@@ -27,8 +107,8 @@ type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict
 /// ----------
 /// depth : DepthImage or numpy.ndarray, shape (H, W)
 ///     Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
-///     more bits with `scale`. Pixels without a measurement are 0, negative or NaN. A `DepthImage`
-///     is shared, not copied.
+///     more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
+///     uint16. A `DepthImage` is shared, not copied.
 /// mask : numpy.ndarray of bool or uint8, shape (H, W), or None
 ///     Nonzero on the object. `None` selects every pixel. Other integers must be 0 and 1, or 0 and
 ///     255.
@@ -88,19 +168,7 @@ impl PyObservation {
         let image = depth::shared(depth, scale)?;
         let mask = depth::mask(mask, &image)?;
         let camera = camera.0;
-        if (camera.width(), camera.height()) != (image.width(), image.height()) {
-            return Err(InputError::new_err(format!(
-                "camera is for {}x{} images but depth is {} with shape ({}, {}), expected shape \
-                 ({}, {})",
-                camera.width(),
-                camera.height(),
-                array::kind(depth),
-                image.height(),
-                image.width(),
-                camera.height(),
-                camera.width()
-            )));
-        }
+        check_size(&camera, depth, &image)?;
         let size = (image.width(), image.height());
         let color = color.map(|value| color::image(value, "color", Some(size)));
         let color = color.transpose()?;
