@@ -46,7 +46,10 @@ def test_the_examples_of_the_readmes_improve_a_pose(readme):
     assert "Result(refined" in run("smoke.py", readme)
 
 
-PAGES = ["book/first-refinement.md", "coming-from.md", "from-what-you-have.md", "python.md"]
+PAGES = [
+    "book/first-refinement.md", "book/sequences.md", "coming-from.md", "from-what-you-have.md",
+    "python.md",
+]
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -69,6 +72,7 @@ def test_the_python_blocks_of_the_book_run(page, tmp_path, monkeypatch):
         "depth_m": frame.depth, "mask": frame.mask, "masks": [frame.mask], "K": frame.camera.K,
         "T_co": frame.rough, "T_co_N44": np.stack([frame.rough] * 2), "model": frame.model,
         "grasp": lambda pose: None, "T_ts": np.eye(4),
+        "frames": [(frame.observation, np.eye(4))] * 2, "T_bc": np.eye(4),
         "source_points": vertices / 1000, "target_points": vertices / 1000 + 0.001,
     }
     blocks = (FOLDER.parents[2] / "docs" / page).read_text().split("```python\n")[1:]
