@@ -120,7 +120,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let picture = Picture::before_and_after(&model, &observation, &captioned)?;
     write_picture(&arguments.picture, &picture)?;
 
-    let reason = warnings::reason(&refined, &model, &observation, &init);
+    let reason = warnings::reason(&refined, &model, &observation, &init, false);
     say(format_args!(
         "{}: {} triangles, {:.0} mm, seen at {:.2} m on {} pixels, depth noise {} %\npipeline {}, seed {}\n",
         arguments.object.name(),

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::error::ErrorKind;
 use hicp_io::{LengthUnit, MaskRule};
 use hybrid_icp::core::{Isometry3, Model, Observation};
 use hybrid_icp::{Diagnosis, Fault, Preset, Refiner};
@@ -29,6 +30,7 @@ use crate::terminal::{check_stdout, say, warn};
 /// read, with or without faults.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
+#[command(mut_arg("bbox", |bbox| bbox.hide(true)))]
 pub(crate) struct Arguments {
     #[command(flatten)]
     files: RefineFiles,
@@ -42,8 +44,8 @@ pub(crate) struct Arguments {
 
 const USAGE: &str = "\
 hybrid-icp doctor --model <FILE> --model-unit <UNIT>
-           --depth <FILE> [--depth-scale <MM_PER_UNIT>] --mask <FILE>
-           --camera <FILE> --init <FILE> [OPTIONS]";
+           --depth <FILE> [--depth-scale <MM_PER_UNIT>]
+           --mask <FILE> --camera <FILE> --init <FILE> [OPTIONS]";
 
 const EXAMPLE: &str = "\
 Examples:
@@ -77,6 +79,10 @@ struct Named {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let unit = arguments.files.files.unit()?;
     let mut inputs = arguments.files.inputs();
+    if matches!(inputs.region, Region::Box(_)) {
+        let text = "--mask <FILE> is missing, expected the mask of the object alone: in a box, other objects hide the fault\n";
+        return Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text).into());
+    }
     let mut outputs = Files::default().writes("--output", &arguments.output);
     for (option, path) in inputs.files() {
         outputs = outputs.reads(option, [path]);

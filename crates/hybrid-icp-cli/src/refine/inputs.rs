@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use clap::Args;
 use clap::error::ErrorKind;
+use clap::{ArgGroup, Args};
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
 use hybrid_icp::core::{ColorImage, DepthImage, Mask, Model, Observation, PinholeCamera};
 use hybrid_icp::mask_in_box;
@@ -126,17 +126,66 @@ impl MaskOptions {
     }
 }
 
+/// The mask of the object, or its box.
+#[derive(Clone, Debug, Args)]
+#[command(group(ArgGroup::new("region").required(true).args(["mask", "bbox"])))]
+pub(crate) struct RegionOptions {
+    /// The object's mask, of the depth image's size: PNG, TIFF, BMP, NPY, NPZ or PGM. Nonzero on
+    /// the object, or opaque if the opacity varies.
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+    #[command(flatten)]
+    mask_options: MaskOptions,
+    /// Without a mask: a box around the object, in pixels: its left and upper side, width and
+    /// height. The plane around the box, such as a table, is removed.
+    #[arg(
+        long,
+        value_name = "X,Y,W,H",
+        value_parser = bbox,
+        allow_hyphen_values = true
+    )]
+    bbox: Option<Bbox>,
+}
+
+/// A box: x, y, width and height, pixels.
+type Bbox = [f64; 4];
+
+/// Parses a box.
+fn bbox(text: &str) -> Result<Bbox, String> {
+    let numbers: Result<Vec<f64>, _> = text
+        .split(',')
+        .map(|number| number.trim().parse())
+        .collect();
+    let bbox: Option<Bbox> = numbers.ok().and_then(|numbers| numbers.try_into().ok());
+    bbox.filter(|[x, y, width, height]| {
+        x.is_finite()
+            && y.is_finite()
+            && width.is_finite()
+            && height.is_finite()
+            && *width >= 1.0
+            && *height >= 1.0
+    })
+    .ok_or_else(|| {
+        "expected x,y,width,height in pixels, with a width and height of 1 or more".to_owned()
+    })
+}
+
+impl RegionOptions {
+    pub(super) fn region(&self) -> Region {
+        match (&self.mask, self.bbox) {
+            (Some(path), _) => Region::Mask(path.clone(), self.mask_options.rule()),
+            (None, bbox) => Region::Box(bbox.unwrap_or_default()),
+        }
+    }
+}
+
 /// The files of a refinement: object, image, mask and initial pose.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct RefineFiles {
     #[command(flatten)]
     pub(crate) files: ImageFiles,
-    /// The object's mask, of the depth image's size: PNG, TIFF, BMP, NPY, NPZ or PGM. Nonzero on
-    /// the object, or opaque if the opacity varies.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) mask: PathBuf,
     #[command(flatten)]
-    mask_options: MaskOptions,
+    region: RegionOptions,
     /// The rough pose, model to camera: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c
     /// (three numbers in mm); or a 4x4 matrix, R and t, or a translation and a quaternion of stated
     /// order, as JSON, YAML, text or NPY; or a TUM line (x y z qx qy qz qw).
@@ -152,7 +201,7 @@ impl RefineFiles {
     pub(crate) fn inputs(&self) -> Inputs {
         Inputs {
             files: self.files.clone(),
-            region: Region::Mask(self.mask.clone(), self.mask_options.rule()),
+            region: self.region.region(),
             init: Some(self.init.clone()),
             init_unit: self.init_unit,
         }
@@ -165,7 +214,7 @@ pub(crate) enum Region {
     /// The file of a mask.
     Mask(PathBuf, MaskRule),
     /// A box: x, y, width and height, pixels.
-    Box([f64; 4]),
+    Box(Bbox),
 }
 
 /// Reads a camera for the images of `size` in `image`.
@@ -243,6 +292,12 @@ impl Inputs {
                         "--bbox {x},{y},{width},{height}: the box is outside of the {w}x{h} image {}, expected x,y,width,height in its pixels",
                         files.depth.display()
                     );
+                }
+                let (right, low) = (x + width, y + height);
+                if right > w + 0.1 * width || low > h + 0.1 * height {
+                    warnings.push(format!(
+                        "--bbox {x},{y},{width},{height}: the box ends at {right},{low}, outside of the {w}x{h} image: check that it is x,y,width,height, and not two corners"
+                    ));
                 }
                 (None, *bbox)
             }

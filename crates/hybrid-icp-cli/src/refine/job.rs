@@ -7,7 +7,7 @@ use clap::Args;
 use hicp_picture::Picture;
 use hybrid_icp::icp::Verdict;
 
-use super::inputs::{Inputs, Read};
+use super::inputs::{Inputs, Read, Region};
 use super::report::{self, Report};
 use super::trace::{self, TraceLines};
 use super::warnings;
@@ -84,7 +84,8 @@ impl JobOptions {
 
         let found = refined.outcome.camera_from_object;
         let from = init.unwrap_or(found);
-        let reason = warnings::reason(&refined, &model, &observation, &from);
+        let in_box = matches!(inputs.region, Region::Box(_));
+        let reason = warnings::reason(&refined, &model, &observation, &from, in_box);
         let summary = match init {
             Some(_) => report::summary(&refined, &reason),
             None => report::summary_of_estimate(&refined, &reason),

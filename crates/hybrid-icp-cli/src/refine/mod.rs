@@ -36,7 +36,8 @@ pub(crate) struct Arguments {
 
 const USAGE: &str = "\
 hybrid-icp refine --model <FILE> --model-unit <UNIT>
-           --depth <FILE> [--depth-scale <MM_PER_UNIT>] --mask <FILE>
+           --depth <FILE> [--depth-scale <MM_PER_UNIT>]
+           (--mask <FILE> | --bbox <X,Y,W,H>)
            --camera <FILE> --init <FILE> [OPTIONS]";
 
 const EXAMPLE: &str = "\

@@ -23,18 +23,23 @@ pub(super) fn doctor(inputs: &Inputs) -> &'static str {
 /// Returns the reason for the outcome of a refinement.
 ///
 /// If the initial pose was kept because of an evident flaw of the inputs, the reason names it.
+/// `in_box` is `true` if a box replaces the mask.
 pub(crate) fn reason(
     refined: &Refinement,
     model: &Model,
     observation: &Observation,
     init: &Isometry3<f64>,
+    in_box: bool,
 ) -> String {
     let ended = refined.outcome.termination.explain();
     if refined.outcome.verdict == Verdict::Refined {
         return ended.to_owned();
     }
     let cause = if observation.mask().bounding_region().area() == 0 {
-        "the mask is empty"
+        match in_box {
+            true => "no depth was measured in the box",
+            false => "the mask is empty",
+        }
     } else if observation.n_measured() == 0 {
         "no depth was measured inside the mask"
     } else if observation.n_surfels() == 0 {
@@ -102,9 +107,9 @@ pub(super) fn about_facts(
     let in_words = |fault: Fault| match fault {
         Fault::MaskEmpty => Some(match inputs.region {
             Region::Mask(..) => format!("{mask}: {fault}: {}", fault.fix()),
-            Region::Box(_) => format!(
-                "{mask}: nothing but a plane is measured in the box, or nothing at all: check the box and {depth}"
-            ),
+            Region::Box(_) => {
+                format!("{mask}: no depth was measured in the box: check the box and {depth}")
+            }
         }),
         Fault::MeshInsideOut => Some(format!("{model}: {fault}: {}", fault.fix())),
         _ => None,

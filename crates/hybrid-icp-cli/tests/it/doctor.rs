@@ -46,6 +46,12 @@ fn posed(change: impl Fn(Isometry3<f64>) -> Isometry3<f64>) -> Scene {
 
 #[test]
 fn clean_inputs_have_no_fault() {
+    let words = "doctor --model mesh.ply --model-unit m --depth depth.png --camera camera.json \
+                 --init init.json --bbox 60,30,200,180";
+    let folder = Scene::new().folder;
+    run(folder.path(), words.split_whitespace())
+        .exits(2)
+        .complains(&["--mask"]);
     let (text, json) = examine(&Scene::new());
     assert_eq!(
         (&json["faults"], &json["warnings"]),

@@ -51,6 +51,9 @@ fn an_object_is_found_in_its_mask_or_box() {
         let told = run(scene.folder.path(), ["replay", "trace.jsonl"]).exits(0);
         assert!(told.out.contains("all equal"), "{}", told.out);
     }
+    let bbox = bbox.trim_start_matches("--bbox ");
+    let refine = scene.without("--mask").with("--bbox", bbox);
+    assert!(error(CAR, &pose_of(&refine.result()), &truth()) < 0.001);
 }
 
 #[test]
@@ -58,9 +61,9 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
     let scene = Scene::new();
     let told = estimate(&scene, "--bbox 0,0,20,20").exits(0);
     assert!(told.out.starts_with("found no pose: "), "{}", told.out);
-    let result = result(&scene);
-    assert_eq!(result["outcome"], "not_found");
-    assert!(result.get("cam_R_m2c").is_none() && result.get("cam_t_m2c").is_none());
+    let found = result(&scene);
+    assert_eq!(found["outcome"], "not_found");
+    assert!(found.get("cam_R_m2c").is_none() && found.get("cam_t_m2c").is_none());
     for (region, parts) in [
         ("", &["--bbox"][..]),
         ("--mask mask.png --bbox 1,2,3,4", &["--bbox", "--mask"]),
@@ -84,10 +87,16 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
     }
     let dropped = DepthImage::from_meters(320, 240, vec![0.0; 320 * 240]).unwrap();
     hicp_io::write_depth_png(scene.path("depth.png"), &dropped, 0.1).unwrap();
-    let parts = ["--bbox: nothing but a plane", "check the box and depth.png"];
+    let parts = ["--bbox: no depth was measured in the box: check the box and depth.png"];
     estimate(&scene, "--bbox 60,30,200,180")
         .exits(0)
         .complains(&parts);
+    let reason = result(&scene)["reason"].clone();
+    let expected = "no depth was measured in the box, so that ";
+    assert!(reason.as_str().unwrap().starts_with(expected), "{reason}");
+    estimate(&scene, "--bbox 60,30,320,240")
+        .exits(0)
+        .complains(&["the box ends at 380,270", "not two corners"]);
     for bbox in ["320,0,9,9", "-9,0,9,9", "0,240,9,9"] {
         estimate(&scene, &format!("--bbox {bbox}"))
             .exits(1)
