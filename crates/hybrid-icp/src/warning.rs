@@ -64,7 +64,7 @@ pub enum Warning {
     /// The surface inside the mask is much nearer or farther than the object at the initial pose:
     /// probably a wrong depth scale, or a translation in another unit.
     #[error(
-        "the median depth inside the mask is {}, but the object at the initial pose is at {}",
+        "the median depth inside the mask is {}, but the pose puts the object at {}",
         Meters(*measured),
         Meters(*expected)
     )]
@@ -77,7 +77,7 @@ pub enum Warning {
     /// The mask has many more pixels than the object can cover at its distance: probably a wrong
     /// unit of the mesh.
     #[error(
-        "the mask has {pixels} pixels, but the model ({}) at the initial pose ({}) covers at most {at_most:.0}",
+        "the mask has {pixels} pixels, but the model ({}) at the distance of the pose ({}) covers at most {at_most:.0}",
         Meters(*diameter),
         Meters(*distance)
     )]
@@ -96,7 +96,7 @@ pub enum Warning {
     ///
     /// Masks that touch the border of the image are exempt.
     #[error(
-        "the mask has {pixels} pixels, but the model ({}) at the initial pose ({}) covers {at_least:.0} from its smallest side",
+        "the mask has {pixels} pixels, but the model ({}) at the distance of the pose ({}) covers {at_least:.0} from its smallest side",
         Meters(*diameter),
         Meters(*distance)
     )]

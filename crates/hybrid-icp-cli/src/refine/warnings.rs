@@ -72,9 +72,14 @@ pub(super) fn about_inputs(
     let files = &inputs.files;
     let (unit, model, depth) = (files.unit()?, files.model.display(), files.depth.display());
     let mask = inputs.mask_name();
-    let (init, pose_unit) = match &inputs.init {
-        Some(path) => (path.display().to_string(), " and --init-unit"),
-        None => (String::new(), ""),
+    let (init, pose_unit, size_unit) = match &inputs.init {
+        Some(path) => (
+            path.display().to_string(),
+            " and --init-unit",
+            " and --init-unit",
+        ),
+        // An estimate is as far away as the depth says.
+        None => (String::new(), "", " and --depth-scale"),
     };
     let in_words = |warning| match warning {
         Warning::Diameter { .. } => format!("{model}: {warning}, check --model-unit {unit}"),
@@ -88,7 +93,7 @@ pub(super) fn about_inputs(
             "{depth}: {warning}: check --depth-scale (now {depth_scale} mm per unit){pose_unit}{doctor}"
         ),
         Warning::Mask { .. } | Warning::Sliver { .. } => {
-            format!("{mask}: {warning}: check --model-unit {unit}{pose_unit}{doctor}")
+            format!("{mask}: {warning}: check --model-unit {unit}{size_unit}{doctor}")
         }
         _ => format!("{model}: {warning}"),
     };
