@@ -19,7 +19,7 @@ pub(crate) struct JobOptions {
     #[arg(long, value_name = "OUT.csv")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
-    pub(crate) pipeline: PipelineArguments,
+    pipeline: PipelineArguments,
     #[command(flatten)]
     pub(crate) models: ModelOptions,
     #[command(flatten)]
@@ -73,6 +73,12 @@ impl JobOptions {
             .writes("--rows", &self.rows);
         files.check_in_place("--output", replaceable)?;
         files.spare_dataset(&dataset.root, &dataset.split)
+    }
+
+    /// Chooses the pipeline; by default, `color` if color images are used.
+    pub(crate) fn choose_pipeline(&self, dataset: &DatasetOptions) -> anyhow::Result<Pipeline> {
+        let color = !self.models.no_color && dataset.has_color();
+        self.pipeline.choose(color)
     }
 
     /// Returns the job for the rows of a file.

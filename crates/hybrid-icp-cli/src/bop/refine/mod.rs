@@ -75,8 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .reads("--results", [results])
         .reads("--detections", &arguments.masks.detections);
     arguments.job.check_files(files, "--results", dataset)?;
-    let color = !arguments.job.models.no_color && dataset.has_color();
-    let pipeline = arguments.job.pipeline.choose(color)?;
+    let pipeline = arguments.job.choose_pipeline(dataset)?;
     let rows = arguments.read_rows()?;
     let masks = arguments.masks.source()?;
     let job = arguments.job.job(dataset, results, masks, pipeline);
