@@ -46,7 +46,8 @@ pub(crate) fn in_words(warning: Warning) -> String {
     match warning {
         Warning::BehindCamera { z } => format!(
             "T_co puts the object's center at z = {z:.4} m, behind the camera, which looks along \
-             +z: expected camera from object, not object from camera"
+             +z: expected camera from object, not object from camera, nor an OpenGL pose \
+             (np.diag([1, -1, -1, 1]) @ T_co converts it)"
         ),
         Warning::Depth { measured, expected } => format!(
             "T_co puts the object's center at z = {expected:.4} m, but the median depth inside the \

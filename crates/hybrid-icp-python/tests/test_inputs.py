@@ -90,7 +90,7 @@ def test_a_batch_names_the_pose_that_is_wrong(scene):
 
 def test_frames_and_units_that_do_not_match_cause_a_warning(scene):
     pipeline = hi.Pipeline.preset("hybrid")
-    with pytest.warns(hi.InputWarning, match="behind the camera, .* not object from camera"):
+    with pytest.warns(hi.InputWarning, match="behind the camera, .* not object from camera, nor .* OpenGL"):
         pipeline.refine(scene.model, scene.observation, pose([0, 0, 0], [0, 0, -0.5]))
     message = "at z = 5.0.* but the median depth inside the mask is 0.[45]"
     with pytest.warns(hi.InputWarning, match=message):
