@@ -247,10 +247,8 @@ impl Bench {
         let Instance { scene, init, .. } = &loaded.instance;
         let observation = &scene.observation;
         let view = (self.workspace).view(&scene.model, observation.camera(), init);
-        let region = view.region();
-        let union = (region.v_min..region.v_max)
-            .flat_map(|v| (region.u_min..region.u_max).map(move |u| (u, v)))
-            .filter(|&(u, v)| view.depth_at(u, v) > 0.0)
+        let union = view
+            .covered()
             .filter(|&(u, v)| observation.mask().get(u, v) == Some(false))
             .count()
             + observation.n_measured();

@@ -82,8 +82,8 @@ impl BoundaryMap {
             let beside_border = |u: u32, v: u32| {
                 u < width || v < width || u + width >= image.u_max || v + width >= image.v_max
             };
-            let at_boundary = (region.v_min..region.v_max)
-                .flat_map(|v| (region.u_min..region.u_max).map(move |u| (u, v)))
+            let at_boundary = region
+                .pixels()
                 .map(|(u, v)| beside_border(u, v) || rule.holds(u, v, &image, depth_at))
                 .collect();
             Self { at_boundary }

@@ -47,25 +47,15 @@ impl BoxMask {
         let region = self.grown(&silhouette_box(view)?, depth);
         let (lowest, highest) = self.corners(model);
         let object_from_camera = camera_from_object.inverse();
-        let width = depth.width() as usize;
-        let mut pixels = vec![false; depth.pixels().len()];
-        let mut any = false;
-        for v in region.v_min..region.v_max {
-            let row = v as usize * width;
-            let columns = row + region.u_min as usize..row + region.u_max as usize;
-            let measured = depth.pixels()[columns.clone()].iter();
-            let row = pixels[columns].iter_mut().zip(measured);
-            for (u, (pixel, z)) in (region.u_min..).zip(row) {
-                if *z > 0.0 {
-                    let seen = camera.unproject(f64::from(u), f64::from(v), f64::from(*z));
-                    let point = object_from_camera * seen;
-                    *pixel = lowest <= point && point <= highest;
-                    any |= *pixel;
-                }
-            }
-        }
-        let mask = any.then(|| Mask::new(depth.width(), depth.height(), pixels));
-        mask?.ok()
+        let mask = Mask::in_region(depth.width(), depth.height(), &region, |u, v| {
+            let measured = depth.get(u, v).filter(|z| *z > 0.0);
+            measured.is_some_and(|z| {
+                let seen = camera.unproject(f64::from(u), f64::from(v), f64::from(z));
+                let point = object_from_camera * seen;
+                lowest <= point && point <= highest
+            })
+        });
+        (!mask.bounding_region().is_empty()).then_some(mask)
     }
 
     /// Returns two opposite corners of the model's grown bounding box, in the object frame, meters.
@@ -90,12 +80,8 @@ impl BoxMask {
         // The clamp keeps the value in the range of u32, and NaN becomes 0.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let by = pixels as u32;
-        PixelRegion {
-            u_min: region.u_min.saturating_sub(by),
-            v_min: region.v_min.saturating_sub(by),
-            u_max: region.u_max.saturating_add(by).min(depth.width()),
-            v_max: region.v_max.saturating_add(by).min(depth.height()),
-        }
+        let image = PixelRegion::of_image(depth.width(), depth.height());
+        region.grown(by).intersection(&image)
     }
 }
 
@@ -107,10 +93,5 @@ fn silhouette_box(view: &RenderedView) -> Option<PixelRegion> {
         u_max: u + 1,
         v_max: v + 1,
     });
-    pixels.reduce(|a, b| PixelRegion {
-        u_min: a.u_min.min(b.u_min),
-        v_min: a.v_min,
-        u_max: a.u_max.max(b.u_max),
-        v_max: b.v_max,
-    })
+    pixels.reduce(|a, b| a.union(&b))
 }

@@ -80,11 +80,8 @@ impl RenderedView {
 
     /// Returns the pixels of the image that show the surface, row by row.
     pub fn covered(&self) -> impl Iterator<Item = (u32, u32)> {
-        let region = self.region;
-        let rows = region.v_min..region.v_max;
-        let pixels = rows.flat_map(move |v| (region.u_min..region.u_max).map(move |u| (u, v)));
-        let covered = pixels.zip(&self.depth).filter(|(_, z)| **z > 0.0);
-        covered.map(|(pixel, _)| pixel)
+        let pixels = self.region.pixels().zip(&self.depth);
+        pixels.filter_map(|(pixel, z)| (*z > 0.0).then_some(pixel))
     }
 
     /// Returns the depth at an image pixel, in meters.

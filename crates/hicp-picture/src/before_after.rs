@@ -49,9 +49,10 @@ impl Picture {
                 .depth()
                 .get(shown.u_min + u / scale, shown.v_min + v / scale)
         };
-        let rows = 0..camera.height();
-        let pixels = rows.flat_map(|v| (0..camera.width()).map(move |u| (u, v)));
-        let pixels = pixels.map(|(u, v)| depth(u, v).unwrap_or(0.0));
+        let pixels = camera
+            .region()
+            .pixels()
+            .map(|(u, v)| depth(u, v).unwrap_or(0.0));
         let depth = DepthImage::collect(camera.width(), camera.height(), pixels)?;
 
         let mut picture = Self::of_depth(&depth);

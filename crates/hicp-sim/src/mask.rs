@@ -85,7 +85,8 @@ impl Cut {
             offset: f64::INFINITY,
         };
         let region = mask.bounding_region();
-        let mut positions: Vec<f64> = pixels(&region)
+        let mut positions: Vec<f64> = region
+            .pixels()
             .filter(|(u, v)| mask.get(*u, *v) == Some(true))
             .map(|(u, v)| cut.position(u, v))
             .collect();
@@ -113,9 +114,8 @@ pub(crate) fn map_mask(
     mut new: impl FnMut(u32, u32, bool) -> bool,
 ) -> Result<Mask, SimError> {
     let image = PixelRegion::of_image(mask.width(), mask.height());
-    let set = pixels(&image)
-        .zip(mask.pixels())
-        .map(|((u, v), set)| new(u, v, *set));
+    let set = image.pixels().zip(mask.pixels());
+    let set = set.map(|((u, v), set)| new(u, v, *set));
     Ok(Mask::new(mask.width(), mask.height(), set.collect())?)
 }
 
@@ -125,20 +125,10 @@ pub(crate) fn map_depth(
     mut new: impl FnMut(u32, u32, f32) -> f32,
 ) -> Result<DepthImage, SimError> {
     let (width, height) = (depth.width(), depth.height());
-    let depths = pixels(&PixelRegion::of_image(width, height)).zip(depth.pixels());
+    let image = PixelRegion::of_image(width, height);
+    let depths = image.pixels().zip(depth.pixels());
     let depths = depths.map(|((u, v), z)| new(u, v, *z));
     Ok(DepthImage::collect(width, height, depths)?)
-}
-
-/// Returns the pixels of a region, row by row.
-pub(crate) fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> + use<> {
-    let PixelRegion {
-        u_min,
-        u_max,
-        v_min,
-        v_max,
-    } = *region;
-    (v_min..v_max).flat_map(move |v| (u_min..u_max).map(move |u| (u, v)))
 }
 
 /// Averages a mask over square cells, interpolates between their centers, and thresholds.
@@ -155,7 +145,7 @@ fn soften(mask: &Mask, cells: u32, threshold: f64) -> Result<Mask, SimError> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     // At least 0, and clamped to the cells.
     let index = |x: f64| (x as usize).min(count - 1);
-    for (u, v) in pixels(&region) {
+    for (u, v) in region.pixels() {
         let at = index(cell(v, region.v_min)) * count + index(cell(u, region.u_min));
         sums[at].0 += f64::from(u8::from(mask.get(u, v) == Some(true)));
         sums[at].1 += 1.0;
@@ -254,7 +244,7 @@ mod tests {
         for radius in [1_u32, 2, 5] {
             let (eroded, dilated) = (apply(0.0, radius, 0, &mask), apply(0.0, 0, radius, &mask));
             let r = i64::from(radius);
-            for (u, v) in pixels(&PixelRegion::of_image(100, 80)) {
+            for (u, v) in PixelRegion::of_image(100, 80).pixels() {
                 let around = |wanted: bool| {
                     (-r..=r)
                         .flat_map(|dy| (-r..=r).map(move |dx| (dx, dy)))

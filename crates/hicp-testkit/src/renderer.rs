@@ -67,7 +67,7 @@ pub fn check_renderer<T: Renderer + 'static>(make: impl Fn() -> T, laws: Rendere
             trial.same(PURE, &view, &used_view);
             let whole = whole.get_or_insert_with(|| view.clone());
             let law = "a render of a part of the image is equal to that part of the whole render";
-            for (u, v) in pixels(&region) {
+            for (u, v) in region.pixels() {
                 let (own, there) = (view.depth_at(u, v), whole.depth_at(u, v));
                 let found = format_args!("{own} in the part, {there} in the whole at ({u}, {v})");
                 trial.holds(law, own.to_bits() == there.to_bits(), found);
@@ -109,18 +109,13 @@ fn behind(case: &Case) -> bool {
     (case.pose * model.center()).z < -model.radius()
 }
 
-fn pixels(region: &PixelRegion) -> impl Iterator<Item = (u32, u32)> {
-    let columns = region.u_min..region.u_max;
-    (region.v_min..region.v_max).flat_map(move |v| columns.clone().map(move |u| (u, v)))
-}
-
 #[allow(clippy::cast_precision_loss)] // Counts of pixels.
 fn agrees(trial: &Trial<'_>, case: &Case, view: &RenderedView, share: f64) {
     let region = sides(&case.problem).1.camera().region();
     let mut reference = RenderedView::default();
     draw(&mut Rasterizer::default(), case, &region, &mut reference);
     let (mut shown, mut differing) = (0_usize, 0_usize);
-    for (u, v) in pixels(&region) {
+    for (u, v) in region.pixels() {
         let (own, there) = (view.depth_at(u, v), reference.depth_at(u, v));
         shown += usize::from(own > 0.0 || there > 0.0);
         differing += usize::from((own > 0.0) != (there > 0.0) || (own - there).abs() > 1e-3);

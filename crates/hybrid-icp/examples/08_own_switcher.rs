@@ -34,15 +34,10 @@ impl Switcher for BesideTheMask {
             };
         };
         let mask = observation.mask();
-        let region = view.region();
         let (mut rendered, mut beside) = (0_u32, 0_u32);
-        for v in region.v_min..region.v_max {
-            for u in region.u_min..region.u_max {
-                if view.depth_at(u, v) > 0.0 {
-                    rendered += 1;
-                    beside += u32::from(mask.get(u, v) != Some(true));
-                }
-            }
+        for (u, v) in view.covered() {
+            rendered += 1;
+            beside += u32::from(mask.get(u, v) != Some(true));
         }
         let share = if rendered == 0 {
             1.0

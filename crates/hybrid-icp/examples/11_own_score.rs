@@ -26,16 +26,13 @@ impl Score for DepthError {
         else {
             return 1.0;
         };
-        let region = observation.region();
         let (mut sum, mut count) = (0.0, 0_u32);
-        for v in region.v_min..region.v_max {
-            for u in region.u_min..region.u_max {
-                let measured = observation.depth().get(u, v).unwrap_or(0.0);
-                if observation.mask().get(u, v) == Some(true) && measured > 0.0 {
-                    let difference = (view.depth_at(u, v) - measured).abs();
-                    sum += f64::from(difference.min(self.limit_meters));
-                    count += 1;
-                }
+        for (u, v) in observation.region().pixels() {
+            let measured = observation.depth().get(u, v).unwrap_or(0.0);
+            if observation.mask().get(u, v) == Some(true) && measured > 0.0 {
+                let difference = (view.depth_at(u, v) - measured).abs();
+                sum += f64::from(difference.min(self.limit_meters));
+                count += 1;
             }
         }
         // A score is never NaN: where nothing was measured, nothing speaks for the pose.

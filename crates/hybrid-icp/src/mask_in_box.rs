@@ -58,24 +58,10 @@ pub fn mask_in_box(depth: &DepthImage, camera: &PinholeCamera, bbox: [f64; 4]) -
         (Some(z), Some(plane)) => plane.distance(u, v, z) < -plane.tolerance,
         (z, _) => z.is_some(),
     };
-    let mask = |holds: &dyn Fn(u32, u32) -> bool| {
-        let mut pixels = vec![false; depth.pixels().len()];
-        let mut count = 0;
-        for v in region.v_min..region.v_max {
-            for u in region.u_min..region.u_max {
-                let set = holds(u, v);
-                count += usize::from(set);
-                pixels[v as usize * depth.width() as usize + u as usize] = set;
-            }
-        }
-        let Ok(mask) = Mask::new(depth.width(), depth.height(), pixels) else {
-            unreachable!("the mask has the size of the depth image");
-        };
-        (count, mask)
-    };
-    let (all, everything) = mask(&|u, v| measured(u, v).is_some());
-    let (left, foreground) = mask(&in_front);
-    match left as f64 > LEAST_LEFT * all as f64 {
+    let (width, height) = (depth.width(), depth.height());
+    let everything = Mask::in_region(width, height, &region, |u, v| measured(u, v).is_some());
+    let foreground = Mask::in_region(width, height, &region, in_front);
+    match foreground.n_set() as f64 > LEAST_LEFT * everything.n_set() as f64 {
         true => foreground,
         false => everything,
     }
@@ -111,13 +97,8 @@ impl Plane {
         let step = (outer.area().saturating_sub(inner.area()) / MAX_SAMPLES)
             .isqrt()
             .max(1);
-        let rows = (outer.v_min..outer.v_max).step_by(step);
-        let pixels: Vec<Vector3<f64>> = rows
-            .flat_map(|v| {
-                (outer.u_min..outer.u_max)
-                    .step_by(step)
-                    .map(move |u| (u, v))
-            })
+        let pixels: Vec<Vector3<f64>> = outer
+            .grid(step)
             .filter(|(u, v)| !inner.contains(*u, *v))
             .filter_map(|(u, v)| Some(Vector3::new(f64::from(u), f64::from(v), depth(u, v)?)))
             .collect();

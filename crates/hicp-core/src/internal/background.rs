@@ -60,12 +60,10 @@ impl Background {
         let (depth, mask) = (observation.depth(), observation.mask());
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Far below 2³².
         let band = (RING * (area as f64).sqrt()).ceil().max(4.0) as u32;
-        let columns = region.u_min.saturating_sub(band)..(region.u_max + band).min(camera.width());
-        let rows = region.v_min.saturating_sub(band)..(region.v_max + band).min(camera.height());
-        let step = (columns.len() * rows.len() / (2 * MOST)).isqrt().max(1);
-        let ring: Vec<Vector3<f64>> = rows
-            .step_by(step)
-            .flat_map(|v| columns.clone().step_by(step).map(move |u| (u, v)))
+        let around = region.grown(band).intersection(&camera.region());
+        let step = (around.area() / (2 * MOST)).isqrt().max(1);
+        let ring: Vec<Vector3<f64>> = around
+            .grid(step)
             .filter(|(u, v)| mask.get(*u, *v) == Some(false))
             .filter_map(|(u, v)| {
                 let z = f64::from(depth.get(u, v)?);

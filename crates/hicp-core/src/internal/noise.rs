@@ -11,16 +11,14 @@ pub(crate) fn depth_noise(observation: &Observation) -> f64 {
     let (depth, mask) = (observation.depth(), observation.mask());
     let step = (region.area() / 512).isqrt().max(1);
     let mut differences: Vec<f32> = Vec::with_capacity(1024);
-    for v in (region.v_min..region.v_max).step_by(step) {
-        for u in (region.u_min..region.u_max).step_by(step) {
-            let at = |u: u32| match (mask.get(u, v), depth.get(u, v)) {
-                (Some(true), Some(z)) if z > 0.0 => Some(z),
-                _ => None,
-            };
-            let around = (at(u.wrapping_sub(1)), at(u), at(u + 1));
-            if let (Some(left), Some(z), Some(right)) = around {
-                differences.push((z - 0.5 * (left + right)).abs());
-            }
+    for (u, v) in region.grid(step) {
+        let at = |u: u32| match (mask.get(u, v), depth.get(u, v)) {
+            (Some(true), Some(z)) if z > 0.0 => Some(z),
+            _ => None,
+        };
+        let around = (at(u.wrapping_sub(1)), at(u), at(u + 1));
+        if let (Some(left), Some(z), Some(right)) = around {
+            differences.push((z - 0.5 * (left + right)).abs());
         }
     }
     if differences.is_empty() {

@@ -154,9 +154,9 @@ impl Observation {
     /// Returns every `factor`-th surfel in both directions, for a coarse region.
     fn every(&self, factor: u32, coarse: &PixelRegion) -> Surfels {
         let fine = self.surfel_map();
-        let surfels: Vec<Surfel> = (coarse.v_min..coarse.v_max)
-            .flat_map(|v| (coarse.u_min..coarse.u_max).map(move |u| (u * factor, v * factor)))
-            .filter_map(|(u, v)| self.region.index(u, v))
+        let surfels: Vec<Surfel> = coarse
+            .pixels()
+            .filter_map(|(u, v)| self.region.index(u * factor, v * factor))
             .map(|index| fine[index])
             .collect();
         let n_surfels = n_surfels(&surfels);
@@ -398,13 +398,8 @@ impl Observation {
         );
         let fine_width = self.depth.width() as usize;
         let pixels = || {
-            (0..self.depth.height() as usize)
-                .step_by(step)
-                .flat_map(move |v| {
-                    (0..fine_width)
-                        .step_by(step)
-                        .map(move |u| v * fine_width + u)
-                })
+            let grid = self.camera.region().grid(step);
+            grid.map(move |(u, v)| v as usize * fine_width + u as usize)
         };
         let region = PixelRegion {
             u_min: self.region.u_min.div_ceil(factor),

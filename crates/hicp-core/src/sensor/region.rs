@@ -71,6 +71,38 @@ impl PixelRegion {
             .then(|| (v - self.v_min) as usize * self.width() + (u - self.u_min) as usize)
     }
 
+    /// Returns the pixels of the region, row by row.
+    ///
+    /// ```
+    /// let region = hicp_core::PixelRegion { u_min: 3, v_min: 1, u_max: 5, v_max: 3 };
+    /// assert!(region.pixels().eq([(3, 1), (4, 1), (3, 2), (4, 2)]));
+    /// ```
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        self.grid(1)
+    }
+
+    /// Returns every `step`-th pixel of every `step`-th row, from the region's corner.
+    ///
+    /// # Panics
+    ///
+    /// If `step` is 0.
+    pub fn grid(&self, step: usize) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let columns = (self.u_min..self.u_max).step_by(step);
+        let rows = (self.v_min..self.v_max).step_by(step);
+        rows.flat_map(move |v| columns.clone().map(move |u| (u, v)))
+    }
+
+    /// Returns the region with `by` more pixels on every side, which may leave the image.
+    #[must_use]
+    pub fn grown(&self, by: u32) -> Self {
+        Self {
+            u_min: self.u_min.saturating_sub(by),
+            v_min: self.v_min.saturating_sub(by),
+            u_max: self.u_max.saturating_add(by),
+            v_max: self.v_max.saturating_add(by),
+        }
+    }
+
     /// Returns the common part of two regions; empty, but well formed, if they do not overlap.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
@@ -81,6 +113,21 @@ impl PixelRegion {
             v_min,
             u_max: self.u_max.min(other.u_max).max(u_min),
             v_max: self.v_max.min(other.v_max).max(v_min),
+        }
+    }
+
+    /// Returns the smallest region that contains both.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        match (self.is_empty(), other.is_empty()) {
+            (true, _) => *other,
+            (_, true) => *self,
+            (false, false) => Self {
+                u_min: self.u_min.min(other.u_min),
+                v_min: self.v_min.min(other.v_min),
+                u_max: self.u_max.max(other.u_max),
+                v_max: self.v_max.max(other.v_max),
+            },
         }
     }
 }

@@ -42,15 +42,13 @@ impl Stage for RayShift {
             let region = view.region().intersection(&observation.region());
             let (depth, mask) = (observation.depth(), observation.mask());
             self.differences.clear();
-            for v in region.v_min..region.v_max {
-                for u in region.u_min..region.u_max {
+            self.differences
+                .extend(region.pixels().filter_map(|(u, v)| {
                     let rendered = view.depth_at(u, v);
                     let measured = depth.get(u, v).filter(|_| mask.get(u, v) == Some(true));
                     let measured = measured.filter(|z| *z > 0.0 && rendered > 0.0);
-                    let difference = measured.map(|z| f64::from(z) - f64::from(rendered));
-                    self.differences.extend(difference);
-                }
-            }
+                    measured.map(|z| f64::from(z) - f64::from(rendered))
+                }));
             let middle = self.differences.len() / 2;
             let center = (pose * model.center()).coords;
             if self.differences.is_empty() || center.z <= 0.0 {

@@ -1,6 +1,6 @@
 //! VSD by the rules of BOP'19: from renders of both poses and the test image.
 
-use hicp_core::{DepthImage, DistanceImage, Isometry3, PinholeCamera, PixelRegion, RenderedView};
+use hicp_core::{DepthImage, DistanceImage, Isometry3, PinholeCamera, RenderedView};
 
 use crate::errors::vsd::{ScoreError, visibility_masks, vsd};
 use crate::tolerances::N_TOLERANCES;
@@ -39,17 +39,15 @@ pub fn bop_vsd(
             expected,
         });
     }
-    let region = around(&estimate.region(), &truth.region()).intersection(&camera.region());
+    let region = estimate.region().union(&truth.region());
+    let region = region.intersection(&camera.region());
     let crop = |depth_at: &dyn Fn(u32, u32) -> f32| -> Result<DistanceImage, ScoreError> {
-        let mut distances = Vec::with_capacity(region.area());
-        for v in region.v_min..region.v_max {
-            for u in region.u_min..region.u_max {
-                let ratio = camera.distance_per_depth(f64::from(u), f64::from(v));
-                distances.push(f64::from(depth_at(u, v)) * ratio);
-            }
-        }
+        let distances = region.pixels().map(|(u, v)| {
+            let ratio = camera.distance_per_depth(f64::from(u), f64::from(v));
+            f64::from(depth_at(u, v)) * ratio
+        });
         let (width, height) = (region.u_max - region.u_min, region.v_max - region.v_min);
-        Ok(DistanceImage::new(width, height, distances)?)
+        Ok(DistanceImage::new(width, height, distances.collect())?)
     };
     let test = crop(&|u, v| test.get(u, v).unwrap_or(0.0))?;
     let estimate = crop(&|u, v| estimate.depth_at(u, v))?;
@@ -76,20 +74,4 @@ pub fn spheres_overlap(estimate: &Isometry3<f64>, truth: &Isometry3<f64>, diamet
     }
     let between = (a.xy() / a.z - b.xy() / b.z).norm();
     between < 0.5 * diameter * (1.0 / a.z + 1.0 / b.z)
-}
-
-/// Returns the smallest region that contains both.
-fn around(a: &PixelRegion, b: &PixelRegion) -> PixelRegion {
-    if a.is_empty() {
-        return *b;
-    }
-    if b.is_empty() {
-        return *a;
-    }
-    PixelRegion {
-        u_min: a.u_min.min(b.u_min),
-        v_min: a.v_min.min(b.v_min),
-        u_max: a.u_max.max(b.u_max),
-        v_max: a.v_max.max(b.v_max),
-    }
 }

@@ -153,21 +153,19 @@ fn gather(
     let (depth, mask) = (observation.depth(), observation.mask().pixels());
     let width = depth.width() as usize;
     let mut n = 0;
-    for v in (region.v_min..region.v_max).step_by(step) {
-        for u in (region.u_min..region.u_max).step_by(step) {
-            let index = v as usize * width + u as usize;
-            let (measured, rendered) = (depth.pixels()[index], view.depth_at(u, v));
-            if mask[index] && measured > 0.0 && rendered > 0.0 {
-                let [u, v] = [u - region.u_min, v - region.v_min].map(f64::from);
-                let [measured, rendered] = [measured, rendered].map(f64::from);
-                *pixels.get_mut(n)? = Pixel {
-                    u,
-                    v,
-                    measured,
-                    rendered,
-                };
-                n += 1;
-            }
+    for (u, v) in region.grid(step) {
+        let index = v as usize * width + u as usize;
+        let (measured, rendered) = (depth.pixels()[index], view.depth_at(u, v));
+        if mask[index] && measured > 0.0 && rendered > 0.0 {
+            let [u, v] = [u - region.u_min, v - region.v_min].map(f64::from);
+            let [measured, rendered] = [measured, rendered].map(f64::from);
+            *pixels.get_mut(n)? = Pixel {
+                u,
+                v,
+                measured,
+                rendered,
+            };
+            n += 1;
         }
     }
     Some(n)

@@ -84,8 +84,7 @@ impl CoarseGrid {
             total: 0,
             seen_through_meters: None,
         };
-        let places = (0..camera.height()).flat_map(|v| (0..camera.width()).map(move |u| (u, v)));
-        for ((u, v), (index, z)) in places.zip(depth.iter().enumerate()) {
+        for ((u, v), (index, z)) in camera.region().pixels().zip(depth.iter().enumerate()) {
             let x = (f64::from(u) - camera.cx()) / camera.fx();
             let y = (f64::from(v) - camera.cy()) / camera.fy();
             let place = (u * factor, v * factor);

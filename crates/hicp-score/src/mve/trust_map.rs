@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use hicp_core::internal::Surroundings;
-use hicp_core::{Observation, PixelRegion};
+use hicp_core::{Observation, PinholeCamera, PixelRegion};
 
 use crate::mve::distances::to_zero;
 use crate::mve::occlusion::VISIBILITY_TOLERANCE_METERS;
@@ -55,15 +55,11 @@ impl TrustMap {
 
     fn new(observation: &Observation, diameter: f64) -> Self {
         let camera = observation.camera();
-        let region = widened(&observation.region(), camera.width(), camera.height());
+        let region = widened(&observation.region(), camera);
         // A coarse grid bounds the cost, which the first score of an observation pays.
         let step = region.width().max(region.height()).div_ceil(SIDE).max(1);
         let width = region.width().div_ceil(step).max(1);
-        let cells = || {
-            let columns = (region.u_min..region.u_max).step_by(step);
-            let rows = (region.v_min..region.v_max).step_by(step);
-            rows.flat_map(move |v| columns.clone().map(move |u| (u, v)))
-        };
+        let cells = || region.grid(step);
         let (depth, mask) = (observation.depth(), observation.mask());
         let masked: Vec<bool> = cells().map(|(u, v)| mask.get(u, v) == Some(true)).collect();
         let depths: Vec<f32> = cells()
@@ -214,18 +210,13 @@ fn certainty(cells: &Cells<'_>, step_meters: f64) -> f32 {
 }
 
 /// Widens a region by the border in which pixels outside the mask have a weight.
-fn widened(region: &PixelRegion, width: u32, height: u32) -> PixelRegion {
+fn widened(region: &PixelRegion, camera: &PinholeCamera) -> PixelRegion {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A small constant.
     let border = BEYOND_PIXELS as u32 + 1;
     if region.is_empty() {
         return *region;
     }
-    PixelRegion {
-        u_min: region.u_min.saturating_sub(border),
-        v_min: region.v_min.saturating_sub(border),
-        u_max: (region.u_max + border).min(width),
-        v_max: (region.v_max + border).min(height),
-    }
+    region.grown(border).intersection(&camera.region())
 }
 
 /// Returns the median depth of the inner half of the mask, meters, from distances to its border.

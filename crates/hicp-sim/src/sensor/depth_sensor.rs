@@ -4,7 +4,6 @@ use hicp_core::{DepthImage, PinholeCamera};
 
 use crate::SimRng;
 use crate::error::{SimError, check_range, check_size};
-use crate::mask::pixels;
 use crate::sensor::distortion::{DEPTH_EDGE_METERS, Distortion};
 use crate::sensor::noise::{DepthNoise, map_depths};
 
@@ -94,7 +93,7 @@ impl Dropout {
             let grazing = min_cosine.is_some_and(|min| cosine().is_some_and(|c| c < min));
             grazing || self.near_edge(depth, u, v)
         };
-        Ok(pixels(&camera.region()).map(is_lost).collect())
+        Ok(camera.region().pixels().map(is_lost).collect())
     }
 
     fn near_edge(&self, depth: &DepthImage, u: u32, v: u32) -> bool {

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use hicp_core::{DepthImage, Isometry3, Mask, Model, PinholeCamera, Translation3};
+use hicp_core::{DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Translation3};
 use hicp_raster::render_depth_image;
 
 /// A model, an image and an initial pose; all of them can be replaced.
@@ -21,7 +21,7 @@ impl Inputs<'_> {
     /// Returns the inputs with other depths: `new` receives column, row and depth (0 if missing).
     pub(super) fn with_depth(&self, new: impl Fn(u32, u32, f64) -> f64) -> Self {
         let (width, height) = (self.depth.width(), self.depth.height());
-        let places = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
+        let places = PixelRegion::of_image(width, height).pixels();
         let depths = places.zip(self.depth.pixels());
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
         let depths = depths.map(|((u, v), z)| new(u, v, f64::from(*z)) as f32);

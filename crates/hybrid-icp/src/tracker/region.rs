@@ -25,13 +25,8 @@ impl Widening {
     ) -> Mask {
         let cell = pixels.max(1);
         let (seen, side) = (view.region(), cell as usize);
-        let region = PixelRegion {
-            u_min: seen.u_min.saturating_sub(cell),
-            v_min: seen.v_min.saturating_sub(cell),
-            u_max: seen.u_max.saturating_add(cell),
-            v_max: seen.v_max.saturating_add(cell),
-        };
-        let region = region.intersection(&PixelRegion::of_image(depth.width(), depth.height()));
+        let image = PixelRegion::of_image(depth.width(), depth.height());
+        let region = seen.grown(cell).intersection(&image);
         let columns = region.width().div_ceil(side);
         let cells = columns * region.height().div_ceil(side);
         let place = |u: u32, v: u32| {
@@ -41,14 +36,11 @@ impl Widening {
         self.near.resize(cells, f32::INFINITY);
         self.far.clear();
         self.far.resize(cells, f32::NEG_INFINITY);
-        let rendered = view.depth().chunks_exact(seen.width().max(1));
-        for (v, row) in (seen.v_min..seen.v_max).zip(rendered) {
-            for (u, z) in (seen.u_min..seen.u_max).zip(row) {
-                if *z > 0.0 {
-                    let cell = place(u, v);
-                    self.near[cell] = self.near[cell].min(*z);
-                    self.far[cell] = self.far[cell].max(*z);
-                }
+        for ((u, v), z) in seen.pixels().zip(view.depth()) {
+            if *z > 0.0 {
+                let cell = place(u, v);
+                self.near[cell] = self.near[cell].min(*z);
+                self.far[cell] = self.far[cell].max(*z);
             }
         }
         spread(&mut self.near, &mut self.rows, columns, f32::min);
