@@ -2,10 +2,7 @@
 //!
 //! Each is an object of about 14,400 visible pixels in a 640×480 image.
 
-use hicp_sim::{
-    Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, RelativeGaussian,
-    object_pose, perturb, rng,
-};
+use hicp_sim::{Household, RelativeGaussian, object_pose, perturb_by_mean, rng};
 use hicp_tests::{Scene, camera, render};
 use hybrid_icp::association::{PointSelection, Stride, VisibleSurface};
 use hybrid_icp::core::internal::index;
@@ -69,12 +66,7 @@ pub fn instance(number: usize, noise_percent: f64) -> Instance {
         percent: noise_percent,
     };
     let depth = noise.apply(&mut rng, &depth);
-    let init = perturb(
-        &mut rng,
-        &truth,
-        MEAN_TRANSLATION_ERROR_METERS,
-        MEAN_ROTATION_ERROR_DEGREES.to_radians(),
-    );
+    let init = perturb_by_mean(&mut rng, &truth);
     let observation = Observation::new(depth, mask, camera).expect("sizes agree");
     let mut source = Vec::new();
     let mut workspace = Workspace::new(Rasterizer::default());

@@ -5,9 +5,7 @@ pub mod instances;
 pub mod stages;
 pub mod work;
 
-use hicp_sim::{
-    Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng,
-};
+use hicp_sim::{Household, perturb_by_mean, rng};
 use hicp_tests::Scene;
 use hybrid_icp::core::{Isometry3, Problem};
 use hybrid_icp::icp::Workspace;
@@ -28,12 +26,7 @@ pub struct Case {
 pub fn case(object: Household) -> Case {
     let mut rng = rng(42);
     let scene = hicp_tests::scene(object, 0.5, &mut rng);
-    let init = perturb(
-        &mut rng,
-        &scene.truth,
-        MEAN_TRANSLATION_ERROR_METERS,
-        MEAN_ROTATION_ERROR_DEGREES.to_radians(),
-    );
+    let init = perturb_by_mean(&mut rng, &scene.truth);
     Case {
         name: object.name(),
         scene,

@@ -1,6 +1,6 @@
 //! The paper's starts (6.2 mm, 9.5° off) on synthetic objects, and a pipeline's results on them.
 
-use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
+use hicp_sim::{perturb_by_mean, rng};
 use hybrid_icp::core::{Isometry3, Problem};
 use hybrid_icp::icp::{Session, Stage, Verdict, Workspace};
 use hybrid_icp::pipeline::PipelineFile;
@@ -26,12 +26,7 @@ pub fn starts(per_object: usize, noise_percent: f64) -> Vec<Start> {
             (0..per_object)
                 .map(move |_| {
                     let scene = scene(object, noise_percent, &mut rng);
-                    let init = perturb(
-                        &mut rng,
-                        &scene.truth,
-                        MEAN_TRANSLATION_ERROR_METERS,
-                        MEAN_ROTATION_ERROR_DEGREES.to_radians(),
-                    );
+                    let init = perturb_by_mean(&mut rng, &scene.truth);
                     Start { scene, init }
                 })
                 .collect::<Vec<_>>()

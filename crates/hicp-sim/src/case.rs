@@ -104,6 +104,11 @@ impl CaseConfig {
             init,
         }
     }
+
+    fn draw_pose(&self, model: &Model, rng: &mut SimRng) -> Isometry3<f64> {
+        let distances = model.diameter()..self.max_distance_meters;
+        object_pose(rng, &model.center(), distances, self.axis_offset_meters)
+    }
 }
 
 /// A perfect image of one object, and a pose to refine. All variants of a study get the same case.
@@ -241,7 +246,7 @@ impl CaseMaker {
                 translation_meters,
                 rotation_degrees,
             } => {
-                let truth = self.draw_pose(model, &mut poses);
+                let truth = self.config.draw_pose(model, &mut poses);
                 let angle = rotation_degrees.to_radians();
                 let init = perturb(&mut inits, &truth, translation_meters, angle);
                 let vsd = self.vsd(model, &truth, &init);
@@ -257,7 +262,9 @@ impl CaseMaker {
                 #[allow(clippy::cast_possible_truncation)]
                 // Below the number of bins.
                 let bin = (index % bins.count as u64) as usize;
-                let found = self.start_in_bin(model, &bins, bin, &mut poses, &mut inits);
+                let config = self.config;
+                let draw = || config.draw_pose(model, &mut poses);
+                let found = self.start_in_bin(model, &bins, bin, &mut inits, draw);
                 let start = found.ok_or_else(|| SimError::UnfilledBin {
                     object: object.to_owned(),
                     index,
@@ -288,30 +295,21 @@ impl CaseMaker {
         })
     }
 
-    fn draw_pose(&self, model: &Model, rng: &mut SimRng) -> Isometry3<f64> {
-        let distances = model.diameter()..self.config.max_distance_meters;
-        object_pose(
-            rng,
-            &model.center(),
-            distances,
-            self.config.axis_offset_meters,
-        )
-    }
-
     /// Draws initial poses, and occasionally another object pose, until one falls into the bin.
     ///
-    /// Drawing both for every try would favor object poses for which the bin is easy to hit.
-    fn start_in_bin(
+    /// `draw` draws the object poses. Drawing both for every try would favor object poses for which
+    /// the bin is easy to hit.
+    pub fn start_in_bin(
         &mut self,
         model: &Model,
         bins: &VsdBins,
         bin: usize,
-        poses: &mut SimRng,
         inits: &mut SimRng,
+        mut draw: impl FnMut() -> Isometry3<f64>,
     ) -> Option<Start> {
         let mut tries = 0;
         for _ in 0..bins.max_poses {
-            let truth = self.draw_pose(model, poses);
+            let truth = draw();
             for _ in 0..bins.tries_per_pose {
                 tries += 1;
                 let translation = bins.max_translation_meters * inits.random::<f64>();
@@ -343,12 +341,17 @@ impl CaseMaker {
     }
 }
 
-/// A true pose, an initial pose, its VSD and the number of tries.
-struct Start {
-    truth: Isometry3<f64>,
-    init: Isometry3<f64>,
-    vsd: f64,
-    tries: u32,
+/// A true pose and an initial pose that fall into a bin of VSD.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// The true pose, camera from object.
+    pub truth: Isometry3<f64>,
+    /// The initial pose, camera from object.
+    pub init: Isometry3<f64>,
+    /// Mean VSD of the initial pose against the true one.
+    pub vsd: f64,
+    /// Number of initial poses that were tried.
+    pub tries: u32,
 }
 
 impl VsdBins {

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use hicp_core::{DepthImage, ImageError, MeshError, PinholeCamera};
+use hicp_core::{DepthImage, ImageError, MeshError, PinholeCamera, internal};
 use thiserror::Error;
 
 /// The reason why a simulation is impossible.
@@ -109,16 +109,8 @@ pub(crate) fn check_range(
 
 /// Returns an error if a depth image has another size than its camera.
 pub(crate) fn check_size(depth: &DepthImage, camera: &PinholeCamera) -> Result<(), SimError> {
-    let (width, height) = (depth.width(), depth.height());
-    if (width, height) == (camera.width(), camera.height()) {
-        return Ok(());
-    }
-    Err(SimError::Image(ImageError::SizeMismatch {
-        first: "depth image",
-        first_width: width,
-        first_height: height,
-        second: "camera",
-        second_width: camera.width(),
-        second_height: camera.height(),
-    }))
+    let of_depth = (depth.width(), depth.height());
+    let of_camera = (camera.width(), camera.height());
+    internal::check_size("depth image", of_depth, "camera", of_camera)?;
+    Ok(())
 }

@@ -36,7 +36,7 @@ mod stream;
 mod trajectory;
 mod tsdf;
 
-pub use case::{Case, CaseConfig, CaseMaker, InitialPose, VsdBins, rotation_of};
+pub use case::{Case, CaseConfig, CaseMaker, InitialPose, Start, VsdBins, rotation_of};
 pub use clutter::{Clutter, ClutterView, PlacedObject, SeenObject};
 pub use corruption::{Corruption, OCCLUDER_GAP_METERS};
 pub use error::SimError;
@@ -47,11 +47,10 @@ pub use photo::Lighting;
 pub use reconstruction::{MIN_COMPONENT_SHARE, Reconstruction, ReconstructionNoise, WrongPose};
 pub use sampling::{
     DEGREES_PER_MILLIMETER, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS,
-    object_pose, perturb, rotation, unit_vector,
+    object_pose, perturb, perturb_by_mean, rotation, unit_vector,
 };
 pub use sensor::{
-    AxialPolynomial, DEPTH_EDGE_METERS, DepthNoise, DepthSensor, Distortion, Dropout,
-    RelativeGaussian, StereoDisparity,
+    DEPTH_EDGE_METERS, DepthNoise, DepthSensor, Distortion, Dropout, RelativeGaussian,
 };
 pub use stream::stream;
 pub use trajectory::Trajectory;

@@ -57,6 +57,18 @@ pub fn object_pose(
     )
 }
 
+/// Returns a pose with errors of the mean size, [`MEAN_TRANSLATION_ERROR_METERS`] and
+/// [`MEAN_ROTATION_ERROR_DEGREES`]; see [`perturb`].
+pub fn perturb_by_mean(rng: &mut SimRng, camera_from_object: &Isometry3<f64>) -> Isometry3<f64> {
+    let angle = MEAN_ROTATION_ERROR_DEGREES.to_radians();
+    perturb(
+        rng,
+        camera_from_object,
+        MEAN_TRANSLATION_ERROR_METERS,
+        angle,
+    )
+}
+
 /// Returns the perturbed pose [R_CO R_δ | t_CO + t_δ] with errors of a given size (§VI-A.4).
 ///
 /// |t_δ| is `translation` meters, and R_δ is a rotation by `angle` radians. Both have uniformly

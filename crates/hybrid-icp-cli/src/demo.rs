@@ -5,10 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use hicp_picture::Picture;
-use hicp_sim::{
-    Household, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, RelativeGaussian,
-    object_pose, perturb, rng,
-};
+use hicp_sim::{Household, RelativeGaussian, object_pose, perturb_by_mean, rng};
 use hybrid_icp::Trace;
 use hybrid_icp::core::{Isometry3, Mask, Observation, PinholeCamera, Problem, se3};
 use hybrid_icp::raster::render_depth_image;
@@ -78,12 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         percent: arguments.noise,
     };
     let depth = noise.apply(&mut rng, &clean);
-    let init = perturb(
-        &mut rng,
-        &truth,
-        MEAN_TRANSLATION_ERROR_METERS,
-        MEAN_ROTATION_ERROR_DEGREES.to_radians(),
-    );
+    let init = perturb_by_mean(&mut rng, &truth);
 
     let mut refiner = pipeline.refiner();
     let mut trace = Trace::new();

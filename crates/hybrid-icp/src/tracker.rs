@@ -12,6 +12,7 @@ mod tracked;
 
 use std::sync::Arc;
 
+use hicp_core::internal::check_size;
 use hicp_core::{DepthImage, ImageError, Isometry3, Mask, Matrix6, Model, PinholeCamera, se3};
 use hicp_score::Evidence;
 
@@ -135,9 +136,10 @@ impl Tracker {
         mask: Option<&Mask>,
     ) -> Result<Tracked, ImageError> {
         let camera = (self.matcher.camera.width(), self.matcher.camera.height());
-        check_size("depth image", (depth.width(), depth.height()), camera)?;
+        let of_depth = (depth.width(), depth.height());
+        check_size("depth image", of_depth, "camera", camera)?;
         if let Some(mask) = mask {
-            check_size("mask", (mask.width(), mask.height()), camera)?;
+            check_size("mask", (mask.width(), mask.height()), "camera", camera)?;
         }
         let Some(mut motion) = self.motion else {
             return Ok(Tracked {
@@ -271,20 +273,6 @@ struct Trial {
     confirmed: bool,
     /// Time for which the state has been [`TrackState::Tracking`] since, seconds.
     tracked: f64,
-}
-
-fn check_size(first: &'static str, size: (u32, u32), camera: (u32, u32)) -> Result<(), ImageError> {
-    if size == camera {
-        return Ok(());
-    }
-    Err(ImageError::SizeMismatch {
-        first,
-        first_width: size.0,
-        first_height: size.1,
-        second: "camera",
-        second_width: camera.0,
-        second_height: camera.1,
-    })
 }
 
 impl std::fmt::Debug for Tracker {

@@ -27,4 +27,5 @@ pub use whole::whole;
 pub use work::Work;
 
 pub use crate::for_tuples;
-pub use crate::object::mesh::coordinate_step;
+pub use crate::object::mesh::{DisjointSets, coordinate_step};
+pub use crate::sensor::image::check_size;

@@ -329,11 +329,7 @@ fn find_facing(mesh: &TriMesh) -> Facing {
         return Facing::Unknown;
     }
 
-    let mut parts = DisjointSets::new(mesh.vertices().len());
-    for &[a, b, c] in &triangles {
-        parts.join(a, b);
-        parts.join(b, c);
-    }
+    let mut parts = DisjointSets::of(mesh.vertices().len(), &triangles);
     // The volume of a closed part does not depend on the origin. One of its own vertices as the
     // origin keeps the sum well conditioned.
     let mut volumes: HashMap<u32, (Point3<f64>, f64)> = HashMap::new();
@@ -364,18 +360,27 @@ pub(crate) fn weld(vertices: &[Point3<f32>]) -> Vec<u32> {
         .collect()
 }
 
-pub(crate) struct DisjointSets {
+/// The sets of vertices that triangles connect.
+#[derive(Debug)]
+pub struct DisjointSets {
     parent: Vec<u32>,
 }
 
 impl DisjointSets {
-    pub(crate) fn new(count: usize) -> Self {
-        Self {
+    /// Connects the corners of each triangle, of `count` vertices.
+    pub fn of<'a>(count: usize, triangles: impl IntoIterator<Item = &'a [u32; 3]>) -> Self {
+        let mut sets = Self {
             parent: (0_u32..).take(count).collect(),
+        };
+        for &[a, b, c] in triangles {
+            sets.join(a, b);
+            sets.join(b, c);
         }
+        sets
     }
 
-    pub(crate) fn find(&mut self, mut x: u32) -> u32 {
+    /// Returns the smallest vertex of the set of a vertex.
+    pub fn find(&mut self, mut x: u32) -> u32 {
         while self.parent[x as usize] != x {
             let grandparent = self.parent[self.parent[x as usize] as usize];
             self.parent[x as usize] = grandparent;
@@ -384,7 +389,7 @@ impl DisjointSets {
         x
     }
 
-    pub(crate) fn join(&mut self, a: u32, b: u32) {
+    fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.find(a), self.find(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }

@@ -55,7 +55,6 @@ impl TriMesh {
     #[must_use]
     pub fn survey(&self) -> MeshSurvey {
         let welded = weld(self.vertices());
-        let mut parts = DisjointSets::new(self.vertices().len());
         let mut seen = HashSet::with_capacity(self.triangles().len());
         // For every edge, its uses in upward and in downward direction.
         let mut edges: HashMap<(u32, u32), [u32; 2]> = HashMap::new();
@@ -73,9 +72,8 @@ impl TriMesh {
                 let walks = edges.entry((from.min(to), from.max(to))).or_default();
                 walks[usize::from(from > to)] += 1;
             }
-            parts.join(a, b);
-            parts.join(b, c);
         }
+        let mut parts = DisjointSets::of(self.vertices().len(), &seen);
         let roots: HashSet<u32> = seen.iter().map(|corners| parts.find(corners[0])).collect();
         let count = |matches: fn(&[u32; 2]) -> bool| edges.values().filter(|e| matches(e)).count();
         MeshSurvey {

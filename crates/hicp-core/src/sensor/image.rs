@@ -413,8 +413,12 @@ fn bounding_region(mask: &Raster<bool>) -> PixelRegion {
     region
 }
 
-/// Returns an error that names both sides if their sizes differ.
-pub(crate) fn check_size(
+/// Returns an error that names both sides if their widths or heights differ.
+///
+/// # Errors
+///
+/// [`ImageError::SizeMismatch`] if the sizes differ.
+pub fn check_size(
     first: &'static str,
     first_size: (u32, u32),
     second: &'static str,

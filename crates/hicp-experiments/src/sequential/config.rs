@@ -1,8 +1,6 @@
 //! The configuration of a sequential study, stored next to its rows.
 
-use hicp_sim::{
-    AxialPolynomial, DepthNoise, Reconstruction, ReconstructionNoise, VsdBins, WrongPose,
-};
+use hicp_sim::{DepthNoise, Reconstruction, ReconstructionNoise, VsdBins, WrongPose};
 use hybrid_icp::{Preset, WithoutPairs};
 use serde::{Deserialize, Serialize};
 
@@ -158,7 +156,7 @@ impl TrajectoryConfig {
         trajectories: u64,
         seed: u64,
     ) -> Result<Self, ExperimentError> {
-        let noise = DepthNoise::Axial(AxialPolynomial::d435_ahn2019_axial()).to_string();
+        let noise = DepthNoise::D435_AHN2019_AXIAL.to_string();
         let config = Self {
             experiment: SEQUENTIAL.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),

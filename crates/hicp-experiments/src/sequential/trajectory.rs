@@ -1,7 +1,7 @@
 //! The camera's path, and the initial pose (§VI-C.1).
 
 use hicp_core::{Isometry3, Model, Translation3, Vector3};
-use hicp_sim::{CaseMaker, VsdBins, object_pose, perturb, rotation_of, stream, unit_vector};
+use hicp_sim::{CaseMaker, VsdBins, object_pose, stream, unit_vector};
 use rand::RngExt;
 
 use super::config::{PathDirection, TrajectoryConfig};
@@ -42,39 +42,32 @@ impl Trajectory {
         let bin = (index % bins.count as u64) as usize;
         let mut paths = stream(config.seed, &[object, "trajectory"], index);
         let mut inits = stream(config.seed, &[object, "trajectory init"], index);
-        for _ in 0..bins.max_poses {
-            let distance = config.start_distance_m;
-            let truth = object_pose(
-                &mut paths,
-                &model.center(),
-                distance..distance,
-                config.axis_offset_m,
-            );
-            let direction = match config.path {
+        let distance = config.start_distance_m;
+        let mut direction = Vector3::z();
+        let found = scorer.start_in_bin(model, &bins, bin, &mut inits, || {
+            let (center, distances) = (model.center(), distance..distance);
+            let truth = object_pose(&mut paths, &center, distances, config.axis_offset_m);
+            direction = match config.path {
                 PathDirection::OpticalAxis => Vector3::z(),
                 PathDirection::Target { offset_m } => {
                     let aside = unit_vector(&mut paths) * (offset_m * paths.random::<f64>());
                     ((truth * model.center()).coords + aside).normalize()
                 }
             };
-            for _ in 0..bins.tries_per_pose {
-                let translation = bins.max_translation_meters * inits.random::<f64>();
-                let init = perturb(&mut inits, &truth, translation, rotation_of(translation));
-                let vsd_initial = scorer.vsd(model, &truth, &init);
-                if bins.bin_of(vsd_initial) == bin {
-                    return Ok(Self {
-                        camera_from_object: truth,
-                        direction,
-                        init,
-                        vsd_initial,
-                    });
-                }
-            }
+            truth
+        });
+        match found {
+            Some(start) => Ok(Self {
+                camera_from_object: start.truth,
+                direction,
+                init: start.init,
+                vsd_initial: start.vsd,
+            }),
+            None => Err(format!(
+                "no start of {object} in bin {bin} of {}, expected one within {} tries around each of {} poses",
+                bins.count, bins.tries_per_pose, bins.max_poses
+            )),
         }
-        Err(format!(
-            "no start of {object} in bin {bin} of {}, expected one within {} tries around each of {} poses",
-            bins.count, bins.tries_per_pose, bins.max_poses
-        ))
     }
 
     /// Returns the motion of the camera over a distance: the next camera frame from the previous

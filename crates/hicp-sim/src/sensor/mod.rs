@@ -6,4 +6,4 @@ mod noise;
 
 pub use depth_sensor::{DepthSensor, Dropout};
 pub use distortion::{DEPTH_EDGE_METERS, Distortion};
-pub use noise::{AxialPolynomial, DepthNoise, RelativeGaussian, StereoDisparity};
+pub use noise::{DepthNoise, RelativeGaussian};

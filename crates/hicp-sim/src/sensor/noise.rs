@@ -33,109 +33,6 @@ impl RelativeGaussian {
     }
 }
 
-/// Gaussian noise with a standard deviation of c₀ + c₁ z + c₂ z² at depth z, both in meters.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxialPolynomial {
-    /// Constant, m.
-    pub c0: f64,
-    /// Linear coefficient.
-    pub c1: f64,
-    /// Quadratic coefficient, 1/m.
-    pub c2: f64,
-}
-
-impl AxialPolynomial {
-    /// Returns the axial term for the Intel `RealSense` D435: σ = 0.001063 + 0.0007278 z + 0.003949
-    /// z².
-    ///
-    /// That is about 0.5 % of z from 0.4 to 1 m.
-    ///
-    /// The coefficients are from public implementations of Ahn, Chae, Noh, Nam & Hong, "Analysis
-    /// and Noise Modeling of the Intel `RealSense` D435 for Mobile Robots", UR 2019. The original
-    /// paper was not consulted. Only the axial term is used, which holds for nearly frontal
-    /// surfaces. One paper that cites it reports up to 4 cm at 2 m, twice this polynomial.
-    #[must_use]
-    // Deviation: axial-only D435 noise: §VI-C.2 uses the noise model of Ahn et al. for the D435.
-    // Here it is only the axial term for frontal surfaces, independent per pixel, because the other
-    // terms were not available.
-    pub fn d435_ahn2019_axial() -> Self {
-        Self {
-            c0: 0.001_063,
-            c1: 0.000_727_8,
-            c2: 0.003_949,
-        }
-    }
-
-    /// Returns the standard deviation at a depth, both in meters.
-    #[must_use]
-    pub fn sigma_meters(&self, depth_meters: f64) -> f64 {
-        self.c0 + depth_meters * (self.c1 + depth_meters * self.c2)
-    }
-
-    /// Returns a noisy copy of an image, as [`RelativeGaussian::apply`] does.
-    #[must_use]
-    pub fn apply(&self, rng: &mut SimRng, depth: &DepthImage) -> DepthImage {
-        disturb(rng, depth, |z, unit| z + self.sigma_meters(z) * unit)
-    }
-}
-
-/// Gaussian noise of a stereo camera's disparity d = f B / z.
-///
-/// To first order, the RMS error of the depth is z² s / (f B).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StereoDisparity {
-    /// Focal length f of the stereo pair, pixels. It may differ from that of the rendering camera.
-    pub focal_pixels: f64,
-    /// Baseline B, meters.
-    pub baseline_meters: f64,
-    /// RMS error s of the disparity, pixels.
-    pub subpixel: f64,
-    /// Step to which the disparity is rounded after adding noise, pixels; 0 for no rounding.
-    pub quantization_pixels: f64,
-}
-
-impl StereoDisparity {
-    /// Returns Intel's formula with nominal values of the D435, without rounding.
-    ///
-    /// The values are 848 pixels over 87°, a baseline of 50 mm, and 0.08 pixels RMS. The last one
-    /// is the value that Intel's depth CTO recommends (librealsense issue 3904; 1/32 is the ideal
-    /// limit).
-    ///
-    /// The noise is 0.9 mm at 0.5 m and 3.6 mm at 1 m. Measured noise of active stereo grows faster
-    /// than z² (Huber et al. 2018).
-    #[must_use]
-    pub fn d435_nominal() -> Self {
-        Self {
-            focal_pixels: 447.0,
-            baseline_meters: 0.05,
-            subpixel: 0.08,
-            quantization_pixels: 0.0,
-        }
-    }
-
-    /// Returns the standard deviation at a depth to first order and without rounding, both in
-    /// meters.
-    #[must_use]
-    pub fn sigma_meters(&self, depth_meters: f64) -> f64 {
-        depth_meters * depth_meters * self.subpixel / (self.focal_pixels * self.baseline_meters)
-    }
-
-    /// Returns a noisy copy of an image, as [`RelativeGaussian::apply`] does.
-    #[must_use]
-    pub fn apply(&self, rng: &mut SimRng, depth: &DepthImage) -> DepthImage {
-        let scale = self.focal_pixels * self.baseline_meters;
-        let step = self.quantization_pixels;
-        disturb(rng, depth, |z, unit| {
-            let disparity = scale / z + self.subpixel * unit;
-            if step > 0.0 {
-                scale / ((disparity / step).round() * step)
-            } else {
-                scale / disparity
-            }
-        })
-    }
-}
-
 /// A noise model by name, for studies, files and command lines.
 ///
 /// All models draw one number per measured pixel, in row-major order. With the same stream, images
@@ -156,35 +53,106 @@ pub enum DepthNoise {
     None,
     /// Noise proportional to the depth.
     Relative(RelativeGaussian),
-    /// Noise with a polynomial of the depth.
-    Axial(AxialPolynomial),
-    /// Noise of the disparity.
-    Stereo(StereoDisparity),
+    /// Noise with a standard deviation of c₀ + c₁ z + c₂ z² at depth z, both in meters.
+    Axial {
+        /// Constant, m.
+        c0: f64,
+        /// Linear coefficient.
+        c1: f64,
+        /// Quadratic coefficient, 1/m.
+        c2: f64,
+    },
+    /// Noise of a stereo camera's disparity d = f B / z.
+    ///
+    /// To first order, the RMS error of the depth is z² s / (f B).
+    Stereo {
+        /// Focal length f of the stereo pair, pixels. It may differ from that of the rendering
+        /// camera.
+        focal_pixels: f64,
+        /// Baseline B, meters.
+        baseline_meters: f64,
+        /// RMS error s of the disparity, pixels.
+        subpixel: f64,
+        /// Step to which the disparity is rounded after adding noise, pixels; 0 for no rounding.
+        quantization_pixels: f64,
+    },
 }
 
 impl DepthNoise {
+    /// The axial term for the Intel `RealSense` D435: σ = 0.001063 + 0.0007278 z + 0.003949 z².
+    ///
+    /// That is about 0.5 % of z from 0.4 to 1 m.
+    ///
+    /// The coefficients are from public implementations of Ahn, Chae, Noh, Nam & Hong, "Analysis
+    /// and Noise Modeling of the Intel `RealSense` D435 for Mobile Robots", UR 2019. The original
+    /// paper was not consulted. Only the axial term is used, which holds for nearly frontal
+    /// surfaces. One paper that cites it reports up to 4 cm at 2 m, twice this polynomial.
+    // Deviation: axial-only D435 noise: §VI-C.2 uses the noise model of Ahn et al. for the D435.
+    // Here it is only the axial term for frontal surfaces, independent per pixel, because the other
+    // terms were not available.
+    pub const D435_AHN2019_AXIAL: Self = Self::Axial {
+        c0: 0.001_063,
+        c1: 0.000_727_8,
+        c2: 0.003_949,
+    };
+
+    /// Intel's formula with nominal values of the D435, without rounding.
+    ///
+    /// The values are 848 pixels over 87°, a baseline of 50 mm, and 0.08 pixels RMS. The last one
+    /// is the value that Intel's depth CTO recommends (librealsense issue 3904; 1/32 is the ideal
+    /// limit).
+    ///
+    /// The noise is 0.9 mm at 0.5 m and 3.6 mm at 1 m. Measured noise of active stereo grows faster
+    /// than z² (Huber et al. 2018).
+    pub const D435_NOMINAL_STEREO: Self = Self::Stereo {
+        focal_pixels: 447.0,
+        baseline_meters: 0.05,
+        subpixel: 0.08,
+        quantization_pixels: 0.0,
+    };
+
     /// Returns a noisy copy of an image.
     ///
     /// Pixels without depth stay without. If noise would make a depth negative, the depth is
     /// removed.
     #[must_use]
     pub fn apply(&self, rng: &mut SimRng, depth: &DepthImage) -> DepthImage {
-        match self {
+        match *self {
             Self::None => depth.clone(),
             Self::Relative(noise) => noise.apply(rng, depth),
-            Self::Axial(noise) => noise.apply(rng, depth),
-            Self::Stereo(noise) => noise.apply(rng, depth),
+            Self::Axial { .. } => disturb(rng, depth, |z, unit| z + self.sigma_meters(z) * unit),
+            Self::Stereo {
+                focal_pixels,
+                baseline_meters,
+                subpixel,
+                quantization_pixels: step,
+            } => disturb(rng, depth, |z, unit| {
+                let scale = focal_pixels * baseline_meters;
+                let disparity = scale / z + subpixel * unit;
+                if step > 0.0 {
+                    scale / ((disparity / step).round() * step)
+                } else {
+                    scale / disparity
+                }
+            }),
         }
     }
 
-    /// Returns the standard deviation at a depth, both in meters; to first order for disparities.
+    /// Returns the standard deviation at a depth, both in meters.
+    ///
+    /// For disparities, it is that to first order and without rounding.
     #[must_use]
     pub fn sigma_meters(&self, depth_meters: f64) -> f64 {
-        match self {
+        match *self {
             Self::None => 0.0,
             Self::Relative(noise) => noise.percent / 100.0 * depth_meters,
-            Self::Axial(noise) => noise.sigma_meters(depth_meters),
-            Self::Stereo(noise) => noise.sigma_meters(depth_meters),
+            Self::Axial { c0, c1, c2 } => c0 + depth_meters * (c1 + depth_meters * c2),
+            Self::Stereo {
+                focal_pixels,
+                baseline_meters,
+                subpixel,
+                ..
+            } => depth_meters * depth_meters * subpixel / (focal_pixels * baseline_meters),
         }
     }
 }
@@ -194,19 +162,15 @@ impl fmt::Display for DepthNoise {
         match self {
             Self::None => write!(f, "none"),
             Self::Relative(RelativeGaussian { percent }) => write!(f, "relative:{percent}"),
-            Self::Axial(noise) if *noise == AxialPolynomial::d435_ahn2019_axial() => {
-                write!(f, "d435-ahn2019-axial")
-            }
-            Self::Axial(AxialPolynomial { c0, c1, c2 }) => write!(f, "axial:{c0},{c1},{c2}"),
-            Self::Stereo(noise) if *noise == StereoDisparity::d435_nominal() => {
-                write!(f, "d435-nominal-stereo")
-            }
-            Self::Stereo(StereoDisparity {
+            named if *named == Self::D435_AHN2019_AXIAL => write!(f, "d435-ahn2019-axial"),
+            named if *named == Self::D435_NOMINAL_STEREO => write!(f, "d435-nominal-stereo"),
+            Self::Axial { c0, c1, c2 } => write!(f, "axial:{c0},{c1},{c2}"),
+            Self::Stereo {
                 focal_pixels,
                 baseline_meters,
                 subpixel,
                 quantization_pixels,
-            }) => write!(
+            } => write!(
                 f,
                 "stereo:{focal_pixels},{baseline_meters},{subpixel},{quantization_pixels}"
             ),
@@ -240,18 +204,18 @@ impl FromStr for DepthNoise {
         match (name, &numbers[..]) {
             ("none", []) => Ok(Self::None),
             ("relative", &[percent]) => Ok(Self::Relative(RelativeGaussian { percent })),
-            ("axial", &[c0, c1, c2]) => Ok(Self::Axial(AxialPolynomial { c0, c1, c2 })),
-            ("d435-ahn2019-axial", []) => Ok(Self::Axial(AxialPolynomial::d435_ahn2019_axial())),
-            ("d435-nominal-stereo", []) => Ok(Self::Stereo(StereoDisparity::d435_nominal())),
+            ("axial", &[c0, c1, c2]) => Ok(Self::Axial { c0, c1, c2 }),
+            ("d435-ahn2019-axial", []) => Ok(Self::D435_AHN2019_AXIAL),
+            ("d435-nominal-stereo", []) => Ok(Self::D435_NOMINAL_STEREO),
             ("stereo", &[focal_pixels, baseline_meters, subpixel, quantization_pixels])
                 if focal_pixels > 0.0 && baseline_meters > 0.0 =>
             {
-                Ok(Self::Stereo(StereoDisparity {
+                Ok(Self::Stereo {
                     focal_pixels,
                     baseline_meters,
                     subpixel,
                     quantization_pixels,
-                }))
+                })
             }
             _ => Err(unknown()),
         }
@@ -320,7 +284,7 @@ mod tests {
 
     #[test]
     fn the_polynomial_and_the_stereo_formula_give_the_published_figures() {
-        let axial = AxialPolynomial::d435_ahn2019_axial();
+        let axial = DepthNoise::D435_AHN2019_AXIAL;
         for (z, millimeters) in [
             (0.2, 1.37),
             (0.3, 1.64),
@@ -337,10 +301,7 @@ mod tests {
                 "{z}: {sigma}"
             );
         }
-        let stereo = StereoDisparity {
-            focal_pixels: 424.0,
-            ..StereoDisparity::d435_nominal()
-        };
+        let stereo: DepthNoise = "stereo:424,0.05,0.08,0".parse().unwrap();
         for (z, millimeters) in [(0.5, 0.94), (1.0, 3.8), (2.0, 15.0)] {
             let sigma = 1e3 * stereo.sigma_meters(z);
             assert!((sigma / millimeters - 1.0).abs() < 0.01, "{z}: {sigma}");
@@ -349,10 +310,7 @@ mod tests {
 
     #[test]
     fn disparities_are_rounded_to_their_step() {
-        let noise = StereoDisparity {
-            quantization_pixels: 0.25,
-            ..StereoDisparity::d435_nominal()
-        };
+        let noise: DepthNoise = "stereo:447,0.05,0.08,0.25".parse().unwrap();
         let wall = DepthImage::from_meters(50, 50, vec![0.7; 2500]).unwrap();
         for z in noise.apply(&mut rng(1), &wall).pixels() {
             let steps = 447.0 * 0.05 / f64::from(*z) / 0.25;

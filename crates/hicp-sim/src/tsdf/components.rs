@@ -1,6 +1,6 @@
 //! Connected components of a mesh.
 
-use hicp_core::internal::index;
+use hicp_core::internal::{DisjointSets, index};
 use hicp_core::{MeshError, Point3, TriMesh};
 
 /// A connected component of a mesh.
@@ -24,12 +24,12 @@ pub struct Component {
 ///
 /// [`MeshError`] if a component has no area.
 pub fn components(mesh: &TriMesh) -> Result<Vec<Component>, MeshError> {
-    let part_of = parts(mesh);
+    let mut parts = DisjointSets::of(mesh.vertices().len(), mesh.triangles());
     // Components are numbered by their first triangle.
     let mut number: Vec<Option<usize>> = vec![None; mesh.vertices().len()];
     let mut triangles: Vec<Vec<[u32; 3]>> = Vec::new();
     for corners in mesh.triangles() {
-        let part = part_of[corners[0] as usize] as usize;
+        let part = parts.find(corners[0]) as usize;
         let number = *number[part].get_or_insert_with(|| {
             triangles.push(Vec::new());
             triangles.len() - 1
@@ -83,30 +83,6 @@ fn volume(mesh: &TriMesh) -> f64 {
         a.dot(&b.cross(&c)) / 6.0
     });
     tetrahedra.sum()
-}
-
-/// Returns for every vertex the smallest vertex index of its component.
-fn parts(mesh: &TriMesh) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0_u32..).take(mesh.vertices().len()).collect();
-    for &[a, b, c] in mesh.triangles() {
-        for (one, other) in [(a, b), (b, c)] {
-            let (one, other) = (root(&mut parent, one), root(&mut parent, other));
-            parent[one.max(other) as usize] = one.min(other);
-        }
-    }
-    (0_u32..)
-        .take(parent.len())
-        .map(|vertex| root(&mut parent, vertex))
-        .collect()
-}
-
-fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
-    while parent[vertex as usize] != vertex {
-        let grandparent = parent[parent[vertex as usize] as usize];
-        parent[vertex as usize] = grandparent;
-        vertex = grandparent;
-    }
-    vertex
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Hybrid ICP from the paper's mean initialization error (§VI-A.5), without noise and with full
 //! masks.
 
-use hicp_sim::{MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, perturb, rng};
+use hicp_sim::{perturb_by_mean, rng};
 use hicp_tests::{OBJECTS, scene, symmetric_pose_distance};
 use hybrid_icp::{Preset, Refiner};
 
@@ -13,12 +13,7 @@ fn the_median_start_is_refined_to_a_fraction_of_a_degree_and_a_millimeter() {
         let mut rng = rng(seed);
         for _ in 0..20 {
             let scene = scene(object, 0.0, &mut rng);
-            let init = perturb(
-                &mut rng,
-                &scene.truth,
-                MEAN_TRANSLATION_ERROR_METERS,
-                MEAN_ROTATION_ERROR_DEGREES.to_radians(),
-            );
+            let init = perturb_by_mean(&mut rng, &scene.truth);
             let refined = refiner.refine(&scene.model, &scene.observation, &init);
             let (angle, distance) = symmetric_pose_distance(
                 &refined.outcome.camera_from_object,

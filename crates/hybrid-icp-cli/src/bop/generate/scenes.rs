@@ -10,9 +10,9 @@ use hicp_io::bop::{
 };
 use hicp_io::{write_depth_png, write_mask_png};
 use hicp_sim::{
-    AxialPolynomial, Clutter, ClutterView, DepthNoise, DepthSensor, Dropout, Hand,
-    MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, MovingConfig, MovingScene,
-    SeenObject, Trajectory, perturb, stream,
+    Clutter, ClutterView, DepthNoise, DepthSensor, Dropout, Hand, MEAN_ROTATION_ERROR_DEGREES,
+    MEAN_TRANSLATION_ERROR_METERS, MovingConfig, MovingScene, SeenObject, Trajectory, perturb,
+    stream,
 };
 use hybrid_icp::core::{Mask, Matrix3, PinholeCamera};
 use rand::RngExt as _;
@@ -203,7 +203,7 @@ pub(super) fn targets(records: &[ImageRecord]) -> Vec<Target> {
 /// It measures no depth at grazing angles and edges.
 fn sensor() -> DepthSensor {
     DepthSensor {
-        noise: DepthNoise::Axial(AxialPolynomial::d435_ahn2019_axial()),
+        noise: DepthNoise::D435_AHN2019_AXIAL,
         quantization_meters: Some(0.001),
         dropout: Dropout {
             max_incidence_degrees: Some(80.0),
