@@ -57,6 +57,13 @@ impl Seen {
     }
 }
 
+/// Adds a fault, and returns the status of the rows that it concerns.
+fn enter(faults: &mut Vec<Fault>, fault: Fault) -> RowStatus {
+    let status = RowStatus::from(&fault);
+    faults.push(fault);
+    status
+}
+
 impl<'a> BopImage<'a> {
     /// Creates an image with the masks for rows of objects.
     pub(crate) fn new(image: Image, masks: Vec<(u32, Source<'a>)>, faults: Vec<Fault>) -> Self {
@@ -143,10 +150,7 @@ impl<'a> BopImage<'a> {
         if let Seen::Read(read) = seen {
             *seen = match self.image.observe(read.clone()) {
                 Ok(observation) => Seen::Observed(Box::new(observation)),
-                Err(error) => {
-                    self.faults.push(Fault::damaged(error.to_string()));
-                    Seen::Unusable(RowStatus::Damaged)
-                }
+                Err(fault) => Seen::Unusable(enter(&mut self.faults, fault)),
             };
         }
         match seen {
@@ -184,15 +188,8 @@ impl<'a> BopImage<'a> {
     pub fn observe_detection(&mut self, detection: &Detection) -> Result<Observation, RowStatus> {
         let source = Source::of(detection).ok_or(RowStatus::NoMask)?;
         let mask = source.read(&self.image);
-        let observation = mask.and_then(|mask| {
-            let observation = self.image.observe(mask);
-            observation.map_err(|error| Fault::damaged(error.to_string()))
-        });
-        observation.map_err(|fault| {
-            let status = RowStatus::from(&fault);
-            self.faults.push(fault);
-            status
-        })
+        let observation = mask.and_then(|mask| self.image.observe(mask));
+        observation.map_err(|fault| enter(&mut self.faults, fault))
     }
 
     /// Reads a mask that is not held. Releases all other masks if the memory would be exceeded.
@@ -207,11 +204,7 @@ impl<'a> BopImage<'a> {
             }
             self.masks[index].seen = match self.masks[index].source.read(&self.image) {
                 Ok(mask) => Seen::Read(mask),
-                Err(fault) => {
-                    let status = RowStatus::from(&fault);
-                    self.faults.push(fault);
-                    Seen::Unusable(status)
-                }
+                Err(fault) => Seen::Unusable(enter(&mut self.faults, fault)),
             };
         }
         match &self.masks[index].seen {

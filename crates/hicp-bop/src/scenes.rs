@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use hicp_io::bop::{Dataset, Scene};
-use hybrid_icp::core::{ColorImage, DepthImage, ImageError, Mask, Observation, PinholeCamera};
+use hybrid_icp::core::{ColorImage, DepthImage, Mask, Observation, PinholeCamera};
 
 use crate::fault::{Fault, FaultKind};
 use crate::frames::FrameKey;
@@ -64,12 +64,13 @@ impl Image {
     }
 
     /// Creates the observation of the image with a mask.
-    pub(crate) fn observe(&self, mask: Mask) -> Result<Observation, ImageError> {
-        let observation = Observation::new(Arc::clone(&self.depth), mask, self.camera)?;
-        match &self.color {
+    pub(crate) fn observe(&self, mask: Mask) -> Result<Observation, Fault> {
+        let observation = Observation::new(Arc::clone(&self.depth), mask, self.camera);
+        let observation = observation.and_then(|observation| match &self.color {
             Some(color) => observation.with_color(Arc::clone(color)),
             None => Ok(observation),
-        }
+        });
+        observation.map_err(|error| Fault::damaged(error.to_string()))
     }
 }
 

@@ -235,6 +235,17 @@ pub enum Verdict {
     KeptInitial(Termination),
 }
 
+impl Verdict {
+    /// Returns the name in reports and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Refined => "refined",
+            Self::KeptInitial(_) => "kept_initial",
+        }
+    }
+}
+
 /// The result of a stage: a pose, the reason why the stage ended, and the quality of the pose.
 ///
 /// The pose was either evaluated (its pairs were found, counted and measured) or is the initial

@@ -102,14 +102,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let warnings: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
     let (pose, termination) = (found.target_from_source(), found.outcome.termination);
-    let refined = found.outcome.verdict == Verdict::Refined;
     let rows = |m: Matrix6<f64>| [0, 1, 2, 3, 4, 5].map(|i| [0, 1, 2, 3, 4, 5].map(|j| m[(i, j)]));
     let matrix = pose.to_homogeneous();
     let matrix = [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| matrix[(i, j)]));
     let mut report = json!({
         "method": method.name(),
         "matrix": matrix,
-        "outcome": if refined { "refined" } else { "kept_initial" },
+        "outcome": found.outcome.verdict.name(),
         "termination": termination.name(),
         "reason": termination.explain(),
         "iterations": found.outcome.iterations,
@@ -132,14 +131,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(rmse) => format!("fitness {:.3}, RMSE {rmse:.3e} m", found.fitness()),
         None => "no pairs".to_owned(),
     };
+    let verdict = match found.outcome.verdict {
+        Verdict::Refined => "refined",
+        Verdict::KeptInitial(_) => "kept the initial pose",
+    };
+    let (iterations, reason) = (found.outcome.iterations, termination.explain());
     say(format!(
-        "{}: {fit}, {} iterations: {}",
-        if refined {
-            "refined"
-        } else {
-            "kept the initial pose"
-        },
-        found.outcome.iterations,
-        termination.explain()
+        "{verdict}: {fit}, {iterations} iterations: {reason}"
     ))
 }

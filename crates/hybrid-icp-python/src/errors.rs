@@ -6,6 +6,7 @@
 use std::error::Error;
 use std::ffi::CString;
 
+use hicp_bop::chain;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -27,16 +28,4 @@ pub(crate) fn file(error: impl Error) -> PyErr {
 pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
     let category = PyType::new::<InputWarning>(py);
     PyErr::warn(py, &category, &CString::new(message)?, 1)
-}
-
-/// Returns an error's message with those of its sources.
-fn chain(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(error) = source {
-        text.push_str(": ");
-        text.push_str(&error.to_string());
-        source = error.source();
-    }
-    text
 }

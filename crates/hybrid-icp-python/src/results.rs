@@ -32,14 +32,6 @@ pub(crate) fn create<'py>(
     module.getattr(class)?.call((), Some(fields))
 }
 
-/// Returns the name of a verdict, as in the reports of the program.
-fn name(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Refined => "refined",
-        Verdict::KeptInitial(_) => "kept_initial",
-    }
-}
-
 /// Returns the pose of an outcome. An initial pose has the numbers that were passed, which can be
 /// orthogonal only to their precision.
 fn pose(outcome: &Outcome, init: &Motion) -> Matrix {
@@ -107,7 +99,7 @@ fn stage<'py>(py: Python<'py>, record: &StageRecord) -> Record<'py> {
             stop_rules: record.stop_rules.clone(),
             n_source: record.n_source,
             T_co: Matrix::from(&outcome.camera_from_object),
-            outcome: name(outcome.verdict),
+            outcome: outcome.verdict.name(),
             termination: outcome.termination.name(),
             iterations: outcome.iterations,
             n_pairs: outcome.n_pairs(),
@@ -154,7 +146,7 @@ pub(crate) fn result<'py>(
             evidence: BTreeMap::from(refinement.evidence.named()),
             warnings: texts(&refinement.warnings()),
             alternatives: others?,
-            outcome: name(outcome.verdict),
+            outcome: outcome.verdict.name(),
             termination: outcome.termination.name(),
             iterations: outcome.iterations,
             n_pairs: outcome.n_pairs(),
@@ -177,7 +169,7 @@ pub(crate) fn alignment<'py>(py: Python<'py>, alignment: &Alignment, init: &Moti
         py,
         Alignment {
             T_ts: pose(outcome, init),
-            outcome: name(outcome.verdict),
+            outcome: outcome.verdict.name(),
             termination: outcome.termination.name(),
             iterations: outcome.iterations,
             fitness: alignment.fitness(),

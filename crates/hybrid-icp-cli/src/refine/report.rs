@@ -90,7 +90,7 @@ impl Report {
             translation_mm,
             pipeline: pipeline.to_owned(),
             outcome: match (init, outcome.verdict) {
-                (Some(_), kind) => verdict(kind),
+                (Some(_), kind) => kind.name(),
                 (None, Verdict::Refined) => "estimated",
                 (None, Verdict::KeptInitial(_)) => "not_found",
             },
@@ -129,7 +129,7 @@ impl StageReport {
             n_pairs: outcome.n_pairs(),
             mean_loss: outcome.evaluation.map(|e| e.mean_loss),
             termination: outcome.termination.name(),
-            outcome: verdict(outcome.verdict),
+            outcome: outcome.verdict.name(),
         }
     }
 }
@@ -147,13 +147,6 @@ pub(crate) fn alternative(other: &Alternative) -> Value {
     }
     add_pose(&mut object, &other.camera_from_object);
     object
-}
-
-fn verdict(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Refined => "refined",
-        Verdict::KeptInitial(_) => "kept_initial",
-    }
 }
 
 /// Returns the trace as a table: one line per stage that ran.
