@@ -71,8 +71,9 @@ pub fn print(cases: &[Case]) {
             .collect();
         let shift = weights.iter().zip(&scales).map(|(w, (mean, _))| w * mean);
         let bias = input[0] - shift.sum::<f64>();
-        println!("    Unit {{\n        bias: {bias:.4},\n        weights: {weights:.4?},");
-        println!("        outputs: {outputs:.4?},\n    }},");
+        let words: Vec<String> = weights.iter().map(|w| format!("{w:.4}")).collect();
+        let [first, second] = [&words[..8], &words[8..]].map(|words| words.join(", "));
+        println!("    ({bias:.4}, [{first},\n     {second}], {outputs:.4?}),");
     }
     println!("];");
 }

@@ -146,15 +146,12 @@ impl Confidence {
     #[must_use]
     pub fn of(features: &[f64; N_FEATURES], diameter: f64) -> Self {
         let mut sums = BASE;
-        for unit in &UNITS {
-            let products = unit
-                .weights
-                .iter()
-                .zip(features)
-                .map(|(w, x)| w * x.clamp(-LIMIT, LIMIT));
+        for (bias, weights, outputs) in &UNITS {
+            let products = weights.iter().zip(features);
+            let products = products.map(|(w, x)| w * x.clamp(-LIMIT, LIMIT));
             // The maximum of NaN and 0 is 0.
-            let value = (unit.bias + products.sum::<f64>()).max(0.0);
-            for (sum, output) in sums.iter_mut().zip(unit.outputs) {
+            let value = (bias + products.sum::<f64>()).max(0.0);
+            for (sum, output) in sums.iter_mut().zip(outputs) {
                 *sum += output * value;
             }
         }
