@@ -131,7 +131,7 @@ impl Fusion {
             if step.norm() < self.limits.tolerance {
                 // Below the tolerance, the step certainly improves the pose and is not worth an
                 // evaluation.
-                pose = moved(&pose, &step);
+                pose = se3::compose(&se3::exp(&step), &pose);
                 converged = true;
                 break;
             }
@@ -141,7 +141,7 @@ impl Fusion {
             // scatter over half turns would otherwise not converge.
             let highest = at.cost * (1.0 + 1e-12);
             let (candidate, linearization, falls) = loop {
-                let candidate = moved(&pose, &step);
+                let candidate = se3::compose(&se3::exp(&step), &pose);
                 let linearization = self.linearize(&candidate);
                 iterations += 1;
                 let falls = linearization.cost <= highest;
@@ -242,13 +242,6 @@ impl Fusion {
             .max_by(|a, b| a.trace().total_cmp(&b.trace()))
             .map(|surest| information(&symmetrized(&surest)))
     }
-}
-
-/// Returns exp(ε^) T, with a normalized quaternion.
-fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
-    let mut moved = se3::exp(step) * pose;
-    moved.rotation.renormalize();
-    moved
 }
 
 /// Fuses estimates with [`Fusion`], starting from the one with the smallest tr Σ.

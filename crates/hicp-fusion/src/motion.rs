@@ -82,10 +82,7 @@ impl CameraMotion {
     /// Returns a pose in the next camera frame.
     #[must_use]
     pub fn apply(&self, camera_from_object: &Isometry3<f64>) -> Isometry3<f64> {
-        let mut moved = self.next_camera_from_camera * camera_from_object;
-        // Without renormalization, the quaternion would drift over thousands of frames.
-        moved.rotation.renormalize();
-        moved
+        se3::compose(&self.next_camera_from_camera, camera_from_object)
     }
 
     /// Returns an estimate in the next camera frame.

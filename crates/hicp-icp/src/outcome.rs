@@ -61,42 +61,39 @@ impl Termination {
     /// Returns the name in traces and files.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Converged => "converged",
-            Self::IterationLimit => "iteration_limit",
-            Self::NoPairs => "no_pairs",
-            Self::PairsLost => "pairs_lost",
-            Self::LossIncreased => "loss_increased",
-            Self::Degenerate => "degenerate",
-            Self::Oscillating => "oscillating",
-            Self::OutOfBounds => "out_of_bounds",
-            Self::Deadline => "deadline",
-            Self::Stopped => "stopped",
-            Self::ScoreNotImproved => "score_not_improved",
-            Self::Unsupported(_) => "unsupported",
-            Self::Custom(name) => name,
-        }
+        self.texts().0
     }
 
     /// Returns the reason as a clause of a sentence.
     #[must_use]
     pub fn explain(self) -> &'static str {
+        self.texts().1
+    }
+
+    fn texts(self) -> (&'static str, &'static str) {
         match self {
-            Self::Converged => "the loss stopped changing",
-            Self::IterationLimit => "the limit of iterations was reached",
-            Self::NoPairs => "no pairs of model and observed points were found",
-            Self::PairsLost => "the next step lost too many pairs",
-            Self::LossIncreased => "the next step raised the loss",
-            Self::Degenerate => "the pairs did not determine a step",
-            Self::Oscillating => "the pose kept returning to earlier poses",
-            Self::OutOfBounds => "the pose left the bounds around the initial one",
-            Self::Deadline => "the time limit was reached",
-            Self::Stopped => "the observer requested the stop",
-            Self::ScoreNotImproved => "the score did not improve",
-            Self::Unsupported(_) => {
-                "a part of the pipeline needs a mesh or a depth image instead of a point cloud"
-            }
-            Self::Custom(name) => name,
+            Self::Converged => ("converged", "the loss stopped changing"),
+            Self::IterationLimit => ("iteration_limit", "the limit of iterations was reached"),
+            Self::NoPairs => (
+                "no_pairs",
+                "no pairs of model and observed points were found",
+            ),
+            Self::PairsLost => ("pairs_lost", "the next step lost too many pairs"),
+            Self::LossIncreased => ("loss_increased", "the next step raised the loss"),
+            Self::Degenerate => ("degenerate", "the pairs did not determine a step"),
+            Self::Oscillating => ("oscillating", "the pose kept returning to earlier poses"),
+            Self::OutOfBounds => (
+                "out_of_bounds",
+                "the pose left the bounds around the initial one",
+            ),
+            Self::Deadline => ("deadline", "the time limit was reached"),
+            Self::Stopped => ("stopped", "the observer requested the stop"),
+            Self::ScoreNotImproved => ("score_not_improved", "the score did not improve"),
+            Self::Unsupported(_) => (
+                "unsupported",
+                "a part of the pipeline needs a mesh or a depth image instead of a point cloud",
+            ),
+            Self::Custom(name) => (name, name),
         }
     }
 

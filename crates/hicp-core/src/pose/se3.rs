@@ -34,6 +34,16 @@ pub fn log(motion: &Isometry3<f64>) -> Vector6<f64> {
     join(&rho, &phi)
 }
 
+/// Returns the product of two motions, with a normalized quaternion.
+///
+/// Products of unit quaternions drift off the unit sphere; those of a long run must stay in SO(3).
+#[must_use]
+pub fn compose(after: &Isometry3<f64>, before: &Isometry3<f64>) -> Isometry3<f64> {
+    let mut product = after * before;
+    product.rotation.renormalize();
+    product
+}
+
 /// Returns the adjoint Ad(T) = [C r^C; 0 C], with T exp(ξ^) T⁻¹ = exp((Ad(T) ξ)^).
 ///
 /// If poses move as A T, a left covariance Σ moves as Ad(A) Σ Ad(A)ᵀ.

@@ -43,10 +43,22 @@ pub struct BatchFuser {
     camera_from_anchor: CameraMotion,
 }
 
+/// An estimate, and the covariance that weighs it.
 #[derive(Clone, Copy, Debug)]
-struct Held {
-    estimate: PoseEstimate,
-    weight: Matrix6<f64>,
+pub(crate) struct Held {
+    pub(crate) estimate: PoseEstimate,
+    pub(crate) weight: Matrix6<f64>,
+}
+
+impl Held {
+    /// Moves the estimate to the next camera frame.
+    pub(crate) fn propagate(&mut self, motion: &CameraMotion, transport: Transport, of: Weights) {
+        self.estimate = motion.carry(&self.estimate, transport);
+        self.weight = match of {
+            Weights::Own => self.estimate.covariance,
+            Weights::Constant => motion.carry_weight(&self.weight, transport),
+        };
+    }
 }
 
 impl BatchFuser {
@@ -130,11 +142,7 @@ impl Fuser for BatchFuser {
         self.rebase();
         self.fusion.clear();
         for held in &mut self.held {
-            held.estimate = motion.carry(&held.estimate, transport);
-            held.weight = match self.weights {
-                Weights::Own => held.estimate.covariance,
-                Weights::Constant => motion.carry_weight(&held.weight, transport),
-            };
+            held.propagate(motion, transport, self.weights);
             self.fusion
                 .push_weighted(&held.estimate.camera_from_object, &held.weight);
         }

@@ -48,30 +48,35 @@ impl FusionMethod {
     /// Returns the name on the command line and in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::LastEstimate => "last-estimate",
-            Self::Average => "average",
-            Self::WeightedAverage => "weighted-average",
-            Self::FilteringConstant => "filtering-constant",
-            Self::Filtering => "filtering",
-            Self::MostConfident => "most-confident",
-        }
+        self.texts().0
     }
 
     /// Returns a one-line description.
     #[must_use]
     pub fn summary(self) -> &'static str {
+        self.texts().1
+    }
+
+    fn texts(self) -> (&'static str, &'static str) {
         match self {
-            Self::LastEstimate => "the latest estimate",
-            Self::Average => "all estimates, with equal weights",
-            Self::WeightedAverage => "all estimates, weighted by their covariances",
-            Self::FilteringConstant => {
-                "the latest estimate with a unit covariance, fused with the previous result"
-            }
-            Self::Filtering => {
-                "the latest estimate with its covariance, fused with the previous result"
-            }
-            Self::MostConfident => "the estimate with the lowest uncertainty so far",
+            Self::LastEstimate => ("last-estimate", "the latest estimate"),
+            Self::Average => ("average", "all estimates, with equal weights"),
+            Self::WeightedAverage => (
+                "weighted-average",
+                "all estimates, weighted by their covariances",
+            ),
+            Self::FilteringConstant => (
+                "filtering-constant",
+                "the latest estimate with a unit covariance, fused with the previous result",
+            ),
+            Self::Filtering => (
+                "filtering",
+                "the latest estimate with its covariance, fused with the previous result",
+            ),
+            Self::MostConfident => (
+                "most-confident",
+                "the estimate with the lowest uncertainty so far",
+            ),
         }
     }
 

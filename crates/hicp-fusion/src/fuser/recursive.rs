@@ -1,9 +1,7 @@
 //! Fusers that fuse each estimate with the previous result: `filtering` and `filtering-constant`.
 
-use hicp_core::Matrix6;
-
 use crate::estimate::PoseEstimate;
-use crate::fuser::batch::Weights;
+use crate::fuser::batch::{Held, Weights};
 use crate::fuser::config::FuserConfig;
 use crate::fuser::fuser_trait::{Fuser, Update};
 use crate::fusion::Fusion;
@@ -22,14 +20,8 @@ use crate::solution::Solution;
 pub struct RecursiveFuser {
     config: FuserConfig,
     weights: Weights,
-    state: Option<State>,
+    state: Option<Held>,
     fusion: Fusion,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct State {
-    estimate: PoseEstimate,
-    weight: Matrix6<f64>,
 }
 
 impl RecursiveFuser {
@@ -57,13 +49,8 @@ impl RecursiveFuser {
 
 impl Fuser for RecursiveFuser {
     fn propagate(&mut self, motion: &CameraMotion) {
-        let transport = self.config.transport;
         if let Some(state) = &mut self.state {
-            state.estimate = motion.carry(&state.estimate, transport);
-            state.weight = match self.weights {
-                Weights::Own => state.estimate.covariance,
-                Weights::Constant => motion.carry_weight(&state.weight, transport),
-            };
+            state.propagate(motion, self.config.transport, self.weights);
         }
     }
 
@@ -72,7 +59,7 @@ impl Fuser for RecursiveFuser {
             Weights::Own => estimate.covariance,
             Weights::Constant => self.config.unit.at(&estimate.camera_from_object),
         };
-        let new = State {
+        let new = Held {
             estimate: *estimate,
             weight,
         };
@@ -97,7 +84,7 @@ impl Fuser for RecursiveFuser {
                 .fusion
                 .covariance_from(&fused.estimate, own.into_iter());
         }
-        self.state = Some(State {
+        self.state = Some(Held {
             estimate: fused.estimate,
             weight,
         });

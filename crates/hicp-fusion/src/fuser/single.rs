@@ -59,43 +59,37 @@ const TIE: f64 = 1e-9;
 /// covariance of a motion makes older estimates less certain than newer ones. Among equals, the
 /// newest is selected.
 #[derive(Clone, Debug, Default)]
-pub struct MostConfident {
-    transport: Transport,
-    held: Option<PoseEstimate>,
-}
+pub struct MostConfident(LastEstimate);
 
 impl MostConfident {
     /// Creates the method.
     #[must_use]
     pub fn new(transport: Transport) -> Self {
-        Self {
-            transport,
-            held: None,
-        }
+        Self(LastEstimate::new(transport))
     }
 }
 
 impl Fuser for MostConfident {
     fn propagate(&mut self, motion: &CameraMotion) {
-        self.held = self.held.map(|held| motion.carry(&held, self.transport));
+        self.0.propagate(motion);
     }
 
     fn update(&mut self, estimate: &PoseEstimate) -> Update {
         let surer = |held: &PoseEstimate| {
             log_determinant(&held.covariance) < log_determinant(&estimate.covariance) - TIE
         };
-        if !self.held.as_ref().is_some_and(surer) {
-            self.held = Some(*estimate);
+        if !self.0.held.as_ref().is_some_and(surer) {
+            self.0.update(estimate);
         }
         Update::Accepted(Solution::NONE)
     }
 
     fn estimate(&self) -> Option<PoseEstimate> {
-        self.held
+        self.0.estimate()
     }
 
     fn reset(&mut self) {
-        self.held = None;
+        self.0.reset();
     }
 
     fn name(&self) -> &'static str {

@@ -115,8 +115,7 @@ impl<F: Fuser> SymmetryAware<F> {
         };
         let identity = Isometry3::identity();
         for discrete in std::iter::once(&identity).chain(&self.symmetries.discrete) {
-            let mut candidate = pose * discrete;
-            candidate.rotation.renormalize();
+            let candidate = se3::compose(pose, discrete);
             consider(candidate);
             for axis in &self.symmetries.continuous {
                 consider(turned(&candidate, reference, axis));
@@ -177,9 +176,7 @@ fn turned(
         // The axes are opposite: all angles have the same distance.
         return *pose;
     }
-    let mut turned = pose * axis.rotation(sine.atan2(cosine));
-    turned.rotation.renormalize();
-    turned
+    se3::compose(pose, &axis.rotation(sine.atan2(cosine)))
 }
 
 impl<F: Fuser> Fuser for SymmetryAware<F> {

@@ -153,10 +153,7 @@ where
             if evaluations >= MAX_ITERATIONS {
                 break Termination::IterationLimit;
             }
-            let mut next = step.increment * candidate;
-            // Products of unit quaternions drift off the unit sphere. A long run must stay in
-            // SO(3).
-            next.rotation.renormalize();
+            let next = se3::compose(&step.increment, &candidate);
             if !se3::is_finite(&next) {
                 break Termination::Degenerate;
             }

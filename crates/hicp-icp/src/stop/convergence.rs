@@ -39,11 +39,10 @@ impl StopRule for Convergence {
         };
         let (before, now) = (previous.mean_loss, progress.current.mean_loss);
         let settled = (before - now).abs() < self.relative_change * before;
-        if settled || (before.max(now) <= self.negligible_loss) {
-            Judgment::Accept(Termination::Converged)
-        } else {
-            Judgment::Continue
-        }
+        Judgment::accept_if(
+            settled || (before.max(now) <= self.negligible_loss),
+            Termination::Converged,
+        )
     }
 
     fn name(&self) -> &'static str {
@@ -76,11 +75,7 @@ impl StopRule for AbsoluteLoss {
         let settled = progress
             .previous
             .is_some_and(|previous| (previous.mean_loss - now).abs() < self.change);
-        if settled || now < self.good_enough {
-            Judgment::Accept(Termination::Converged)
-        } else {
-            Judgment::Continue
-        }
+        Judgment::accept_if(settled || now < self.good_enough, Termination::Converged)
     }
 
     fn name(&self) -> &'static str {

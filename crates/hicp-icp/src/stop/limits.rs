@@ -22,11 +22,7 @@ impl Default for IterationLimit {
 
 impl StopRule for IterationLimit {
     fn check(&mut self, iteration: &Iteration<'_>, _progress: &Progress<'_>) -> Judgment {
-        if iteration.index + 1 >= self.0 {
-            Judgment::Accept(Termination::IterationLimit)
-        } else {
-            Judgment::Continue
-        }
+        Judgment::accept_if(iteration.index + 1 >= self.0, Termination::IterationLimit)
     }
 
     fn name(&self) -> &'static str {
@@ -62,11 +58,7 @@ impl StopRule for TimeLimit {
 
     fn check(&mut self, _iteration: &Iteration<'_>, _progress: &Progress<'_>) -> Judgment {
         let started = *self.started.get_or_insert_with(Instant::now);
-        if started.elapsed() >= self.limit {
-            Judgment::Accept(Termination::Deadline)
-        } else {
-            Judgment::Continue
-        }
+        Judgment::accept_if(started.elapsed() >= self.limit, Termination::Deadline)
     }
 
     fn name(&self) -> &'static str {
@@ -83,11 +75,7 @@ pub struct Deadline(pub Instant);
 
 impl StopRule for Deadline {
     fn check(&mut self, _iteration: &Iteration<'_>, _progress: &Progress<'_>) -> Judgment {
-        if Instant::now() >= self.0 {
-            Judgment::Accept(Termination::Deadline)
-        } else {
-            Judgment::Continue
-        }
+        Judgment::accept_if(Instant::now() >= self.0, Termination::Deadline)
     }
 
     fn name(&self) -> &'static str {

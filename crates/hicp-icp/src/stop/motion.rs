@@ -32,11 +32,7 @@ impl StopRule for SmallMotion {
         let (angle, distance) = se3::pose_distance(&next, progress.camera_from_object);
         let still =
             distance < self.translation_meters && angle.to_degrees() < self.rotation_degrees;
-        if still {
-            Judgment::Accept(Termination::Converged)
-        } else {
-            Judgment::Continue
-        }
+        Judgment::accept_if(still, Termination::Converged)
     }
 
     fn name(&self) -> &'static str {
@@ -139,11 +135,7 @@ impl StopRule for Oscillation {
         let returned = older.iter().flatten().any(|before| self.same(before, pose));
         self.recent.rotate_right(1);
         self.recent[0] = Some(*pose);
-        if moved && returned {
-            Judgment::Accept(Termination::Oscillating)
-        } else {
-            Judgment::Continue
-        }
+        Judgment::accept_if(moved && returned, Termination::Oscillating)
     }
 
     fn name(&self) -> &'static str {

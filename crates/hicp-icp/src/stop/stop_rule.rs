@@ -36,6 +36,15 @@ pub enum Judgment {
 }
 
 impl Judgment {
+    /// Accepts the pose, and ends the stage for a reason if a condition holds.
+    pub fn accept_if(ends: bool, reason: Termination) -> Self {
+        if ends {
+            Self::Accept(reason)
+        } else {
+            Self::Continue
+        }
+    }
+
     /// Returns this judgment, or `other` if this one continues.
     fn or(self, other: Self) -> Self {
         if self == Self::Continue { other } else { self }

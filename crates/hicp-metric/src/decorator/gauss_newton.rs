@@ -3,7 +3,7 @@
 use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Isometry3, Iteration, se3};
 
-use crate::decorator::moved::{compose, move_sources};
+use crate::decorator::moved::move_sources;
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
 
@@ -70,7 +70,7 @@ impl<M: Minimize> Minimize for GaussNewton<M> {
                 }
                 break;
             };
-            let next = compose(&solution.increment, &increment);
+            let next = se3::compose(&solution.increment, &increment);
             if !se3::is_finite(&next) {
                 break;
             }

@@ -5,7 +5,7 @@ use std::mem;
 use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Isometry3, Iteration, se3};
 
-use crate::decorator::moved::{compose, move_sources};
+use crate::decorator::moved::move_sources;
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
 
@@ -82,7 +82,7 @@ impl<M: Minimize> Minimize for LevenbergMarquardt<M> {
                 }
                 break;
             };
-            let next = compose(&solution.increment, &increment);
+            let next = se3::compose(&solution.increment, &increment);
             let tried = if se3::is_finite(&next) {
                 move_sources(pairs, &next, &mut self.trial.0);
                 self.metric.mean_loss(iteration, &self.trial.0)

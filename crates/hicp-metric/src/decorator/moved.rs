@@ -23,10 +23,3 @@ pub(crate) fn move_sources(
         Pair { source, ..*pair }
     }));
 }
-
-/// Composes increments, and normalizes the rotation so that long products stay rotations.
-pub(crate) fn compose(after: &Isometry3<f64>, before: &Isometry3<f64>) -> Isometry3<f64> {
-    let mut product = after * before;
-    product.rotation.renormalize();
-    product
-}

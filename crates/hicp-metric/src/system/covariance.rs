@@ -78,13 +78,14 @@ impl NormalEquations {
         let carried = self.camera_from_scaled() * basis;
         let covariance =
             carried * inverse_of(&cholesky6(&reduced)?) * carried.transpose() * variance;
-        // Make it symmetric to the bit.
-        let covariance = (covariance + covariance.transpose()) * 0.5;
-        covariance
-            .iter()
-            .all(|x| x.is_finite())
-            .then_some(covariance)
+        finite(&covariance)
     }
+}
+
+/// Returns a covariance that is symmetric to the bit, or `None` if it is not finite.
+fn finite(covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    let symmetric = (covariance + covariance.transpose()) * 0.5;
+    symmetric.iter().all(|x| x.is_finite()).then_some(symmetric)
 }
 
 /// Returns the sandwich covariance H⁻¹ (Σ gᵢ gᵢᵀ) H⁻¹ · N/(N − 6) of ξ = [ρ; φ].
@@ -122,10 +123,5 @@ pub fn sandwich_covariance<M: ErrorMetric + ?Sized>(
     #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
     let correction = count as f64 / spare as f64;
     let carried = system.camera_from_scaled() * inverse_of(&cholesky6(&hessian)?);
-    let covariance = carried * middle * carried.transpose() * correction;
-    let covariance = (covariance + covariance.transpose()) * 0.5;
-    covariance
-        .iter()
-        .all(|x| x.is_finite())
-        .then_some(covariance)
+    finite(&(carried * middle * carried.transpose() * correction))
 }

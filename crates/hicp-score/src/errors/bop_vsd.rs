@@ -2,7 +2,7 @@
 
 use hicp_core::{DepthImage, DistanceImage, Isometry3, PinholeCamera, RenderedView};
 
-use crate::errors::vsd::{ScoreError, visibility_masks, vsd};
+use crate::errors::vsd::{ScoreError, check_size, visibility_masks, vsd};
 use crate::tolerances::N_TOLERANCES;
 
 /// Returns e_VSD(τ) for τ = 5 %, …, 50 % of the diameter with the visibility masks of BOP'19.
@@ -28,17 +28,8 @@ pub fn bop_vsd(
     diameter: f64,
     delta: f64,
 ) -> Result<[f64; N_TOLERANCES], ScoreError> {
-    let (found, expected) = (
-        (test.width(), test.height()),
-        (camera.width(), camera.height()),
-    );
-    if found != expected {
-        return Err(ScoreError::Size {
-            what: "test image",
-            found,
-            expected,
-        });
-    }
+    let expected = (camera.width(), camera.height());
+    check_size("test image", (test.width(), test.height()), expected)?;
     let region = estimate.region().union(&truth.region());
     let region = region.intersection(&camera.region());
     let crop = |depth_at: &dyn Fn(u32, u32) -> f32| -> Result<DistanceImage, ScoreError> {

@@ -31,6 +31,22 @@ pub enum ScoreError {
     Image(#[from] hicp_core::ImageError),
 }
 
+/// Returns an error if a side does not have the expected size.
+pub(crate) fn check_size(
+    what: &'static str,
+    found: (u32, u32),
+    expected: (u32, u32),
+) -> Result<(), ScoreError> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(ScoreError::Size {
+            what,
+            found,
+            expected,
+        }),
+    }
+}
+
 /// Returns e_VSD(τ) of Eq. 1 for τ = 5 %, …, 50 % of the diameter.
 ///
 /// The inputs are distance maps and visibility masks. A pixel of the union of the masks costs 0 if
@@ -60,13 +76,7 @@ pub fn vsd(
         ("true distance image", (truth.width(), truth.height())),
         ("true mask", (truth_mask.width(), truth_mask.height())),
     ] {
-        if found != expected {
-            return Err(ScoreError::Size {
-                what,
-                found,
-                expected,
-            });
-        }
+        check_size(what, found, expected)?;
     }
     let mut counts = AgreementCounts::new(diameter);
     let mut union = 0;
@@ -105,13 +115,7 @@ pub fn visibility_masks(
         ("true distance image", truth),
     ] {
         let found = (image.width(), image.height());
-        if found != expected {
-            return Err(ScoreError::Size {
-                what,
-                found,
-                expected,
-            });
-        }
+        check_size(what, found, expected)?;
     }
     let visible =
         |model: f64, test: f64| model > 0.0 && (test == 0.0 || in_front(model, test, delta));
