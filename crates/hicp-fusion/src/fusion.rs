@@ -216,13 +216,9 @@ impl Fusion {
             h12 += dt * right;
             h22 += bt * right + dt * (w12.transpose() * b + w22 * d);
         }
-        let mut hessian = Matrix6::zeros();
-        hessian.fixed_view_mut::<3, 3>(0, 0).copy_from(&h11);
-        hessian.fixed_view_mut::<3, 3>(0, 3).copy_from(&h12);
-        hessian
-            .fixed_view_mut::<3, 3>(3, 0)
-            .copy_from(&h12.transpose());
-        hessian.fixed_view_mut::<3, 3>(3, 3).copy_from(&h22);
+        let mut hessian = se3::blocks(&h11, &h12, &h22);
+        let mut below = hessian.fixed_view_mut::<3, 3>(3, 0);
+        below.copy_from(&h12.transpose());
         Linearization {
             cost,
             hessian,

@@ -109,8 +109,6 @@ pub(crate) fn check_range(
 
 /// Returns an error if a depth image has another size than its camera.
 pub(crate) fn check_size(depth: &DepthImage, camera: &PinholeCamera) -> Result<(), SimError> {
-    let of_depth = (depth.width(), depth.height());
-    let of_camera = (camera.width(), camera.height());
-    internal::check_size("depth image", of_depth, "camera", of_camera)?;
+    internal::check_size("depth image", depth.size(), "camera", camera.size())?;
     Ok(())
 }

@@ -135,11 +135,10 @@ impl Tracker {
         seconds: f64,
         mask: Option<&Mask>,
     ) -> Result<Tracked, ImageError> {
-        let camera = (self.matcher.camera.width(), self.matcher.camera.height());
-        let of_depth = (depth.width(), depth.height());
-        check_size("depth image", of_depth, "camera", camera)?;
+        let camera = self.matcher.camera.size();
+        check_size("depth image", depth.size(), "camera", camera)?;
         if let Some(mask) = mask {
-            check_size("mask", (mask.width(), mask.height()), "camera", camera)?;
+            check_size("mask", mask.size(), "camera", camera)?;
         }
         let Some(mut motion) = self.motion else {
             return Ok(Tracked {

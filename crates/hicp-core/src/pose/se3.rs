@@ -163,12 +163,16 @@ fn split(xi: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
     )
 }
 
-fn join(rho: &Vector3<f64>, phi: &Vector3<f64>) -> Vector6<f64> {
+/// Returns the vector [ρ; φ].
+#[must_use]
+pub fn join(rho: &Vector3<f64>, phi: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
 }
 
 /// Assembles [a b; 0 d].
-fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
+/// Returns the matrix [a b; 0 d].
+#[must_use]
+pub fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
     let mut matrix = Matrix6::zeros();
     matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
     matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(b);

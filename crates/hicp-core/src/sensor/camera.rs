@@ -232,6 +232,12 @@ impl PinholeCamera {
         self.height
     }
 
+    /// Image width and height, pixels.
+    #[must_use]
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
     /// Returns the region of the whole image, pixels.
     #[must_use]
     pub fn region(&self) -> PixelRegion {

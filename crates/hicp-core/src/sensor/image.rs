@@ -63,6 +63,12 @@ macro_rules! image_accessors {
             self.0.height
         }
 
+        /// Image width and height, pixels.
+        #[must_use]
+        pub fn size(&self) -> (u32, u32) {
+            (self.0.width, self.0.height)
+        }
+
         /// The pixels, row-major: index `v * width + u`.
         #[must_use]
         pub fn pixels(&self) -> &[$pixel] {
@@ -158,21 +164,12 @@ impl DepthImage {
     ///
     /// [`ImageError::SizeMismatch`] if the camera has a different size.
     pub fn to_distance(&self, camera: &PinholeCamera) -> Result<DistanceImage, ImageError> {
-        check_size(
-            "depth image",
-            (self.width(), self.height()),
-            "camera",
-            (camera.width(), camera.height()),
-        )?;
-        let mut pixels = Vec::with_capacity(self.pixels().len());
-        let mut depths = self.pixels().iter();
-        for v in 0..self.height() {
-            for u in 0..self.width() {
-                let z = f64::from(depths.next().copied().unwrap_or(0.0));
-                pixels.push(z * camera.distance_per_depth(f64::from(u), f64::from(v)));
-            }
-        }
-        DistanceImage::new(self.width(), self.height(), pixels)
+        check_size("depth image", self.size(), "camera", camera.size())?;
+        let pixels = camera.region().pixels().zip(self.pixels());
+        let distances = pixels.map(|((u, v), z)| {
+            f64::from(*z) * camera.distance_per_depth(f64::from(u), f64::from(v))
+        });
+        DistanceImage::new(self.width(), self.height(), distances.collect())
     }
 }
 
@@ -340,15 +337,10 @@ impl Mask {
     /// Creates the mask of the pixels that have a depth, such as the silhouette of a render.
     #[must_use]
     pub fn measured(depth: &DepthImage) -> Self {
-        let (width, height) = (depth.width(), depth.height());
-        let pixels = depth.pixels().iter().map(|z| *z > 0.0).collect();
-        let raster = Raster {
-            width,
-            height,
-            pixels,
-        };
-        let region = bounding_region(&raster);
-        Self(raster, region)
+        let (width, height) = depth.size();
+        let region = PixelRegion::of_image(width, height);
+        let is_measured = |u, v| depth.get(u, v).is_some_and(|z| z > 0.0);
+        Self::in_region(width, height, &region, is_measured)
     }
 
     /// Creates a mask in which every pixel belongs to the object.
@@ -359,18 +351,8 @@ impl Mask {
     /// [`MAX_IMAGE_SIDE`](crate::MAX_IMAGE_SIDE).
     #[must_use]
     pub fn full(width: u32, height: u32) -> Self {
-        let pixels = vec![true; width as usize * height as usize];
-        let region = if pixels.is_empty() {
-            PixelRegion::default()
-        } else {
-            PixelRegion::of_image(width, height)
-        };
-        let raster = Raster {
-            width,
-            height,
-            pixels,
-        };
-        Self(raster, region)
+        let region = PixelRegion::of_image(width, height);
+        Self::in_region(width, height, &region, |_, _| true)
     }
 
     image_accessors!(bool);

@@ -113,14 +113,8 @@ impl Observation {
         normal_window: NormalWindow,
     ) -> Result<Self, ImageError> {
         normal_window.check()?;
-        let size = (depth.width(), depth.height());
-        check_size("mask", (mask.width(), mask.height()), "depth image", size)?;
-        check_size(
-            "camera",
-            (camera.width(), camera.height()),
-            "depth image",
-            size,
-        )?;
+        check_size("mask", mask.size(), "depth image", depth.size())?;
+        check_size("camera", camera.size(), "depth image", depth.size())?;
 
         Ok(Self {
             id: Id::next(),
@@ -174,9 +168,12 @@ impl Observation {
     /// [`ImageError::SizeMismatch`] if the images differ in size.
     pub fn with_color(mut self, color: impl Into<Arc<ColorImage>>) -> Result<Self, ImageError> {
         let color = color.into();
-        let size = (self.depth.width(), self.depth.height());
-        let found = (color.width(), color.height());
-        check_size("color image", found, "depth image", size)?;
+        check_size(
+            "color image",
+            color.size(),
+            "depth image",
+            self.depth.size(),
+        )?;
         self.color = Some(color);
         // Caches must not confuse it with the observation without color.
         (self.id, self.derived) = (Id::next(), Derived::default());

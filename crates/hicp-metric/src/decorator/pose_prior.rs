@@ -4,7 +4,6 @@ use hicp_core::{Correspondences, Isometry3, Iteration, Matrix3, Matrix6, Vector6
 
 use crate::metric::error_metric::Step;
 use crate::metric::minimize::Minimize;
-use crate::system::freedom::blocks;
 use crate::system::normal_equations::NormalEquations;
 
 /// A Gaussian distribution of the pose, given by its mean and its information Λ = Σ⁻¹.
@@ -55,7 +54,7 @@ impl Prior {
                 // The displacement of the object's origin is ρ + φ × t.
                 let shift = -hat(&init.translation.vector);
                 let identity = Matrix3::identity();
-                let about_object = blocks(&identity, &shift, &identity);
+                let about_object = se3::blocks(&identity, &shift, &identity);
                 let [t, r] = [translation_meters, rotation_degrees.to_radians()]
                     .map(|sigma| sigma.powi(2).recip());
                 let information = Matrix6::from_diagonal(&Vector6::new(t, t, t, r, r, r));

@@ -1,6 +1,6 @@
 //! Frozen components of the increment.
 
-use hicp_core::{Matrix3, Matrix6, Point3, UnitQuaternion, Vector6};
+use hicp_core::{Matrix6, Point3, UnitQuaternion, Vector6};
 
 /// The free components of the increment y = [δ; θ].
 ///
@@ -22,13 +22,4 @@ pub(crate) fn reduce(
         basis.transpose() * hessian * basis,
         basis.transpose() * gradient,
     )
-}
-
-/// Assembles [a b; 0 d].
-pub(crate) fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
-    let mut matrix = Matrix6::zeros();
-    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
-    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(b);
-    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(d);
-    matrix
 }

@@ -1,9 +1,9 @@
 //! The 6×6 normal equations of a rigid increment.
 
-use hicp_core::{Matrix3, Matrix6, Point3, Vector3, Vector6, so3::hat};
+use hicp_core::{Matrix3, Matrix6, Point3, Vector3, Vector6, se3, so3::hat};
 
 use crate::system::degeneracy::Degeneracy;
-use crate::system::freedom::{Freedom, blocks};
+use crate::system::freedom::Freedom;
 use crate::system::row_sums::RowSums;
 
 /// The sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centered and scaled.
@@ -170,7 +170,7 @@ impl NormalEquations {
         // L'/L.
         let shift = hat(&(other.pivot - self.pivot)) / -self.length;
         let scale = Matrix3::identity() * (other.length / self.length);
-        let change = blocks(&Matrix3::identity(), &shift, &scale);
+        let change = se3::blocks(&Matrix3::identity(), &shift, &scale);
         self.weight = None;
         let trace = self.damping_trace() + factor * other.damping_trace();
         if self.row_trace.is_some() || other.row_trace.is_some() {
@@ -215,7 +215,7 @@ impl NormalEquations {
     ///
     /// z is the scaled twist around the pivot, and ξ the plain one around the camera origin.
     pub(crate) fn camera_from_scaled(&self) -> Matrix6<f64> {
-        blocks(
+        se3::blocks(
             &Matrix3::identity(),
             &(hat(&self.pivot.coords) / self.length),
             &(Matrix3::identity() / self.length),
@@ -224,7 +224,7 @@ impl NormalEquations {
 
     /// Returns the inverse of [`NormalEquations::camera_from_scaled`].
     pub(crate) fn scaled_from_camera(&self) -> Matrix6<f64> {
-        blocks(
+        se3::blocks(
             &Matrix3::identity(),
             &-hat(&self.pivot.coords),
             &(Matrix3::identity() * self.length),

@@ -28,8 +28,7 @@ pub fn bop_vsd(
     diameter: f64,
     delta: f64,
 ) -> Result<[f64; N_TOLERANCES], ScoreError> {
-    let expected = (camera.width(), camera.height());
-    check_size("test image", (test.width(), test.height()), expected)?;
+    check_size("test image", test.size(), camera.size())?;
     let region = estimate.region().union(&truth.region());
     let region = region.intersection(&camera.region());
     let crop = |depth_at: &dyn Fn(u32, u32) -> f32| -> Result<DistanceImage, ScoreError> {

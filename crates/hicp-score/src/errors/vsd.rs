@@ -67,17 +67,10 @@ pub fn vsd(
     if !(diameter.is_finite() && diameter > 0.0) {
         return Err(ScoreError::Diameter { value: diameter });
     }
-    let expected = (estimate.width(), estimate.height());
-    for (what, found) in [
-        (
-            "mask of the estimate",
-            (estimate_mask.width(), estimate_mask.height()),
-        ),
-        ("true distance image", (truth.width(), truth.height())),
-        ("true mask", (truth_mask.width(), truth_mask.height())),
-    ] {
-        check_size(what, found, expected)?;
-    }
+    let expected = estimate.size();
+    check_size("mask of the estimate", estimate_mask.size(), expected)?;
+    check_size("true distance image", truth.size(), expected)?;
+    check_size("true mask", truth_mask.size(), expected)?;
     let mut counts = AgreementCounts::new(diameter);
     let mut union = 0;
     let estimates = estimate.pixels().iter().zip(estimate_mask.pixels());
@@ -109,14 +102,9 @@ pub fn visibility_masks(
     truth: &DistanceImage,
     delta: f64,
 ) -> Result<(Mask, Mask), ScoreError> {
-    let expected = (test.width(), test.height());
-    for (what, image) in [
-        ("estimated distance image", estimate),
-        ("true distance image", truth),
-    ] {
-        let found = (image.width(), image.height());
-        check_size(what, found, expected)?;
-    }
+    let expected = test.size();
+    check_size("estimated distance image", estimate.size(), expected)?;
+    check_size("true distance image", truth.size(), expected)?;
     let visible =
         |model: f64, test: f64| model > 0.0 && (test == 0.0 || in_front(model, test, delta));
     let mut truth_mask = Vec::with_capacity(test.pixels().len());

@@ -2,7 +2,7 @@
 
 use hicp_core::internal::small::{eigen6, inverse6};
 use hicp_core::nalgebra::{Const, SymmetricEigen};
-use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, so3};
+use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, se3, so3};
 
 /// Largest speed (m/s and rad/s) and time constant (seconds).
 const MAX: f64 = 1e3;
@@ -199,21 +199,14 @@ pub(super) fn difference(
     center: &Point3<f64>,
 ) -> Vector6<f64> {
     let turn = so3::log(&(a.rotation * b.rotation.inverse()));
-    joined(&(a * center - b * center), &turn)
+    se3::join(&(a * center - b * center), &turn)
 }
 
 fn squares([translation, rotation]: [f64; 2]) -> Vector6<f64> {
-    joined(
+    se3::join(
         &Vector3::repeat(translation * translation),
         &Vector3::repeat(rotation * rotation),
     )
-}
-
-fn joined(translation: &Vector3<f64>, rotation: &Vector3<f64>) -> Vector6<f64> {
-    let mut both = Vector6::zeros();
-    both.fixed_rows_mut::<3>(0).copy_from(translation);
-    both.fixed_rows_mut::<3>(3).copy_from(rotation);
-    both
 }
 
 #[cfg(test)]
@@ -273,10 +266,11 @@ mod tests {
         let mut information = Matrix6::zeros();
         for (x, y) in [(-0.1, -0.1), (0.1, -0.1), (0.0, 0.1), (0.1, 0.1)] {
             let point = at.coords + Vector3::new(x, y, 0.0);
-            let row = joined(&Vector3::z(), &point.cross(&Vector3::z()));
+            let row = se3::join(&Vector3::z(), &point.cross(&Vector3::z()));
             information += row * row.transpose();
         }
-        let displacement = Matrix6::from_diagonal(&joined(&Vector3::repeat(1.0), &[0.1; 3].into()));
+        let displacement =
+            Matrix6::from_diagonal(&se3::join(&Vector3::repeat(1.0), &[0.1; 3].into()));
         let registered = Registered::new(&information, &at, &displacement);
         let covariance = registered.covariance(1e-6, [0.0; 2], [0.1, 1.0]);
         let pose = *motion.pose();
