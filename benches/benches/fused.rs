@@ -9,27 +9,19 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hicp_benches::fused::Fused;
-use hicp_benches::{OBJECTS, case};
-use hybrid_icp::association::{
-    DataAssociation, PointSelection, Projective, Stride, VisibleSurface,
-};
-use hybrid_icp::core::Iteration;
-use hybrid_icp::core::{Correspondences, Problem};
-use hybrid_icp::icp::Workspace;
-use hybrid_icp::metric::Minimize;
-use hybrid_icp::metric::{ErrorMetric, PointToPlane};
-use hybrid_icp::raster::Rasterizer;
+use hicp_benches::{OBJECTS, case, selected};
+use hybrid_icp::association::{DataAssociation, Projective, Stride, VisibleSurface};
+use hybrid_icp::core::{Correspondences, Iteration, Problem};
+use hybrid_icp::metric::{ErrorMetric, Minimize, PointToPlane};
 
 fn fused(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("fused");
     for object in OBJECTS {
         let case = case(object);
         let problem = Problem::new(&case.scene.model, &case.scene.observation);
-        let mut workspace = Workspace::new(Rasterizer::default());
+        let mut every_pixel = VisibleSurface::with_stride(Stride::Pixels(1));
+        let (source, mut workspace) = selected(&case.scene, &case.init, &mut every_pixel);
         let mut context = workspace.context(&problem);
-        let mut source = Vec::new();
-        let stride = Stride::Pixels(1);
-        VisibleSurface::with_stride(stride).select(&mut context, &case.init, &mut source);
         group.throughput(Throughput::Elements(source.len() as u64));
 
         if let Some(fused) = Fused::new(&case.scene.observation, &source) {

@@ -13,7 +13,7 @@ use std::hint::black_box;
 use gungraun::{
     Callgrind, EventKind, LibraryBenchmarkConfig, library_benchmark, library_benchmark_group, main,
 };
-use hicp_benches::{Case, case};
+use hicp_benches::{Case, case, selected};
 use hicp_sim::Household;
 use hybrid_icp::association::{
     AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, VisibleSurface,
@@ -50,20 +50,17 @@ struct Ready {
 
 fn ready_with(selection: &mut dyn PointSelection, association: &mut dyn DataAssociation) -> Ready {
     let case = case(Household::Mug);
-    let mut workspace = Workspace::new(Rasterizer::default());
+    let (source, mut workspace) = selected(&case.scene, &case.init, selection);
     let problem = Problem::new(&case.scene.model, &case.scene.observation);
-    let mut context = workspace.context(&problem);
-    let _ = context.view(&case.init);
-    let (mut source, mut pairs) = (Vec::new(), Correspondences::new());
-    selection.select(&mut context, &case.init, &mut source);
-    pairs.begin(&case.init, source.len());
-    association.associate(&mut context, &source, &case.init, &mut pairs);
-    Ready {
+    let _ = workspace.context(&problem).view(&case.init);
+    let mut ready = Ready {
         case,
         workspace,
         source,
-        pairs,
-    }
+        pairs: Correspondences::new(),
+    };
+    pair(&mut ready, association);
+    ready
 }
 
 fn projective() -> Ready {

@@ -7,15 +7,13 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use hicp_benches::{Case, OBJECTS, case};
+use hicp_benches::{Case, OBJECTS, case, selected};
 use hybrid_icp::association::{
     AllSamples, DataAssociation, NearestNeighbor, PointSelection, Projective, VisibleSurface,
 };
-use hybrid_icp::core::Iteration;
-use hybrid_icp::core::{Correspondences, Observation, Problem, RenderedView, Renderer, Surfel};
+use hybrid_icp::core::{Correspondences, Iteration, Observation, Problem, RenderedView, Renderer};
 use hybrid_icp::icp::Workspace;
-use hybrid_icp::metric::Minimize;
-use hybrid_icp::metric::{PointToPlane, PointToPoint};
+use hybrid_icp::metric::{Minimize, PointToPlane, PointToPoint};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, SampledMve, Score};
 
@@ -62,15 +60,6 @@ fn observe(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Selects once and returns the points with the workspace that rendered them.
-fn selected(case: &Case, selection: &mut dyn PointSelection) -> (Vec<Surfel>, Workspace) {
-    let mut workspace = Workspace::new(Rasterizer::default());
-    let problem = Problem::new(&case.scene.model, &case.scene.observation);
-    let mut source = Vec::new();
-    selection.select(&mut workspace.context(&problem), &case.init, &mut source);
-    (source, workspace)
-}
-
 fn select(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("select");
     for case in cases() {
@@ -79,7 +68,7 @@ fn select(criterion: &mut Criterion) {
             [Box::new(AllSamples), Box::new(VisibleSurface::default())];
         for selection in &mut selections {
             // The render is in the cache, so this measures the selection alone.
-            let (mut source, mut workspace) = selected(&case, selection);
+            let (mut source, mut workspace) = selected(&case.scene, &case.init, selection);
             group.bench_function(BenchmarkId::new(selection.name(), case.name), |bencher| {
                 bencher.iter(|| {
                     source.clear();
@@ -97,7 +86,8 @@ fn associate(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("associate");
     for case in cases() {
         let problem = Problem::new(&case.scene.model, &case.scene.observation);
-        let (source, mut workspace) = selected(&case, &mut VisibleSurface::default());
+        let (source, mut workspace) =
+            selected(&case.scene, &case.init, &mut VisibleSurface::default());
         group.throughput(Throughput::Elements(source.len() as u64));
         let mut associations: [Box<dyn DataAssociation>; 2] =
             [Box::new(Projective), Box::new(NearestNeighbor::default())];
@@ -121,7 +111,8 @@ fn metric(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("metric");
     for case in cases() {
         let problem = Problem::new(&case.scene.model, &case.scene.observation);
-        let (source, mut workspace) = selected(&case, &mut VisibleSurface::default());
+        let (source, mut workspace) =
+            selected(&case.scene, &case.init, &mut VisibleSurface::default());
         let mut pairs = Correspondences::new();
         let mut context = workspace.context(&problem);
         Projective.associate(&mut context, &source, &case.init, &mut pairs);
@@ -138,26 +129,18 @@ fn metric(criterion: &mut Criterion) {
 
 fn score(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("score");
-    for case in cases() {
-        let problem = Problem::new(&case.scene.model, &case.scene.observation);
-        let mut workspace = Workspace::new(Rasterizer::default());
-        // The first call renders. The other calls measure the score alone.
-        group.bench_function(BenchmarkId::new("mve", case.name), |bencher| {
-            bencher.iter(|| {
-                let mut context = workspace.context(&problem);
-                MeanVsd::default().score(&mut context, &case.init)
+    let scores: [(&str, Box<dyn Score>); 2] = [
+        ("mve", Box::new(MeanVsd::default())),
+        ("sampled-mve", Box::new(SampledMve::default())),
+    ];
+    for (name, mut score) in scores {
+        for case in cases() {
+            let problem = Problem::new(&case.scene.model, &case.scene.observation);
+            let mut workspace = Workspace::new(Rasterizer::default());
+            group.bench_function(BenchmarkId::new(name, case.name), |bencher| {
+                bencher.iter(|| score.score(&mut workspace.context(&problem), &case.init));
             });
-        });
-    }
-    // Poses per second of a ranking.
-    for case in cases() {
-        let problem = Problem::new(&case.scene.model, &case.scene.observation);
-        let mut workspace = Workspace::new(Rasterizer::default());
-        let mut sampled = SampledMve::default();
-        group.throughput(Throughput::Elements(1));
-        group.bench_function(BenchmarkId::new("sampled-mve", case.name), |bencher| {
-            bencher.iter(|| sampled.score(&mut workspace.context(&problem), &case.init));
-        });
+        }
     }
     group.finish();
 }

@@ -7,19 +7,17 @@
 //!   `target.f32` (raw little-endian points, meters), and the poses in `meta.json`.
 //! - `run METHOD GATE FOLDER` registers the clouds of a folder, from points without normals.
 
-use std::io::{BufRead as _, Write as _};
 use std::path::Path;
 use std::time::Instant;
 
 use hicp_benches::instances::instance;
+use hicp_benches::peer::{Failure, matrix, serve, write_floats};
 use hicp_sim::{RelativeGaussian, rng};
 use hicp_tests::render;
 use hybrid_icp::core::{Isometry3, Matrix4, Observation, Point3, UnitQuaternion, Vector3};
 use hybrid_icp::nalgebra;
 use hybrid_icp::{CloudOptions, Registration, align};
 use serde_json::{Value, json};
-
-type Failure = Box<dyn std::error::Error>;
 
 /// The second scan is taken after a rotation of the object by this angle, degrees.
 const BETWEEN_SCANS: f64 = 15.0;
@@ -28,21 +26,14 @@ const BETWEEN_SCANS: f64 = 15.0;
 const NOISE: f64 = 0.1;
 
 fn main() -> Result<(), Failure> {
-    let mut output = std::io::stdout();
-    for line in std::io::stdin().lock().lines() {
-        let line = line?;
+    serve(|line| {
         let words: Vec<&str> = line.splitn(4, ' ').collect();
-        let answer = match words[..] {
-            ["simulate", number, folder] => simulate(number.parse()?, Path::new(folder))?,
-            ["run", method, gate, folder] => {
-                run(method.parse()?, gate.parse()?, Path::new(folder))?
-            }
-            _ => return Err(format!("unknown command {line:?}").into()),
-        };
-        writeln!(output, "{answer}")?;
-        output.flush()?;
-    }
-    Ok(())
+        match words[..] {
+            ["simulate", number, folder] => simulate(number.parse()?, Path::new(folder)),
+            ["run", method, gate, folder] => run(method.parse()?, gate.parse()?, Path::new(folder)),
+            _ => Err(format!("unknown command {line:?}").into()),
+        }
+    })
 }
 
 /// Writes two scans of an object with noise, the true pose between them, and an initial pose 6.2 mm
@@ -62,15 +53,11 @@ fn simulate(number: usize, folder: &Path) -> Result<Value, Failure> {
     let depth = noise.apply(&mut rng(number as u64), &depth);
     let target = Observation::new(depth, mask, *camera)?;
     for (name, observation) in [("source", &scene.observation), ("target", &target)] {
-        let numbers = observation.surfels(1).flat_map(|(_, s)| {
-            let p = s.point;
-            [p.x, p.y, p.z].map(f32::to_le_bytes)
-        });
-        let bytes: Vec<u8> = numbers.flatten().collect();
-        std::fs::write(folder.join(format!("{name}.f32")), bytes)?;
+        let points = observation.surfels(1).map(|(_, s)| s.point);
+        write_floats(folder, name, points.flat_map(|p| [p.x, p.y, p.z]))?;
     }
     let init = target_from_source * instance.init * scene.truth.inverse();
-    let meta = json!({ "truth": numbers(&target_from_source), "init": numbers(&init) });
+    let meta = json!({ "truth": matrix(&target_from_source), "init": matrix(&init) });
     std::fs::write(folder.join("meta.json"), serde_json::to_vec(&meta)?)?;
     Ok(meta)
 }
@@ -97,7 +84,7 @@ fn run(method: Registration, gate: f32, folder: &Path) -> Result<Value, Failure>
         "normals_ns": nanoseconds(start, prepared),
         "align_ns": nanoseconds(prepared, end),
         "iterations": found.outcome.iterations,
-        "pose": numbers(&found.target_from_source()),
+        "pose": matrix(&found.target_from_source()),
     }))
 }
 
@@ -111,9 +98,4 @@ fn read(folder: &Path, name: &str) -> Result<Vec<Point3<f32>>, Failure> {
         .chunks_exact(3)
         .map(|p| Point3::new(p[0], p[1], p[2]))
         .collect())
-}
-
-/// Returns the 16 numbers of a pose, row by row.
-fn numbers(pose: &Isometry3<f64>) -> Value {
-    json!(pose.to_homogeneous().transpose().as_slice())
 }

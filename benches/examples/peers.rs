@@ -8,13 +8,14 @@
 //!   items, the iterations and the pose.
 
 use std::hint::black_box;
-use std::io::{BufRead as _, Write as _};
 use std::path::Path;
 use std::time::Instant;
 
 use hicp_benches::forget_renders;
 use hicp_benches::fused::Fused;
 use hicp_benches::instances::{Instance, instance, with_10_000_triangles};
+use hicp_benches::peer::{Failure, matrix, serve, write_floats};
+use hicp_benches::selected;
 use hicp_benches::stages::{GATE_METERS, STOP};
 use hybrid_icp::association::{
     DataAssociation, MaxDistance, NearestNeighbor, OutlierFilter, PointSelection, Projective,
@@ -31,8 +32,6 @@ use hybrid_icp::score::{MeanVsd, Score};
 use hybrid_icp::{Preset, presets};
 use serde_json::{Value, json};
 
-type Failure = Box<dyn std::error::Error>;
-
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [folder, noise] = &arguments[..] else {
@@ -45,28 +44,19 @@ fn main() -> Result<(), Failure> {
         view: RenderedView::default(),
     };
     let mut loaded: Option<Loaded> = None;
-    let mut output = std::io::stdout();
-    for line in std::io::stdin().lock().lines() {
-        let line = line?;
-        let answer = match line.split_once(' ') {
-            Some(("load", number)) => {
-                let instance = Loaded::new(instance(number.parse()?, noise))?;
-                write(&Path::new(folder).join(number), &instance)?;
-                loaded = Some(instance);
-                json!({ "loaded": number })
-            }
-            Some(("run", row)) => {
-                let loaded = loaded
-                    .as_ref()
-                    .ok_or("no instance is loaded: send `load NUMBER` first")?;
-                bench.run(row, loaded)?
-            }
-            _ => return Err(format!("unknown command {line:?}").into()),
-        };
-        writeln!(output, "{answer}")?;
-        output.flush()?;
-    }
-    Ok(())
+    serve(|line| match line.split_once(' ') {
+        Some(("load", number)) => {
+            let instance = Loaded::new(instance(number.parse()?, noise))?;
+            write(&Path::new(folder).join(number), &instance)?;
+            loaded = Some(instance);
+            Ok(json!({ "loaded": number }))
+        }
+        Some(("run", row)) => {
+            let unloaded = "no instance is loaded: send `load NUMBER` first";
+            bench.run(row, loaded.as_ref().ok_or(unloaded)?)
+        }
+        _ => Err(format!("unknown command {line:?}").into()),
+    })
 }
 
 /// Writes the arrays that the other libraries register.
@@ -89,16 +79,11 @@ fn write(folder: &Path, loaded: &Loaded) -> Result<(), Failure> {
         "size": [camera.width(), camera.height()],
         "diameter": scene.model.diameter(),
         "center": scene.model.center().coords.as_slice(),
-        "truth": numbers(&scene.truth),
-        "init": numbers(&instance.init),
+        "truth": matrix(&scene.truth),
+        "init": matrix(&instance.init),
     });
     std::fs::write(folder.join("meta.json"), serde_json::to_vec(&meta)?)?;
     Ok(())
-}
-
-/// Returns the 16 numbers of a pose, row by row.
-fn numbers(pose: &Isometry3<f64>) -> Value {
-    json!(pose.to_homogeneous().transpose().as_slice())
 }
 
 fn write_mesh(folder: &Path, mesh: &TriMesh) -> Result<(), Failure> {
@@ -120,15 +105,6 @@ fn write_surfels(folder: &Path, name: &str, surfels: &[Surfel]) -> Result<(), Fa
         [p.x, p.y, p.z, n.x, n.y, n.z]
     });
     write_floats(folder, name, numbers)
-}
-
-fn write_floats(
-    folder: &Path,
-    name: &str,
-    numbers: impl Iterator<Item = f32>,
-) -> Result<(), Failure> {
-    let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
-    Ok(std::fs::write(folder.join(format!("{name}.f32")), bytes)?)
 }
 
 /// Selects the points that it holds.
@@ -155,13 +131,8 @@ struct Loaded {
 impl Loaded {
     fn new(instance: Instance) -> Result<Self, Failure> {
         let (model, observation) = (&instance.scene.model, &instance.scene.observation);
-        let mut every_pixel = Vec::new();
-        let stride = Stride::Pixels(1);
-        VisibleSurface::with_stride(stride).select(
-            &mut Workspace::new(Rasterizer::default()).context(&Problem::new(model, observation)),
-            &instance.init,
-            &mut every_pixel,
-        );
+        let mut selection = VisibleSurface::with_stride(Stride::Pixels(1));
+        let (every_pixel, _) = selected(&instance.scene, &instance.init, &mut selection);
         Ok(Self {
             fine: with_10_000_triangles(model),
             wide: widened(observation)?,
@@ -275,9 +246,7 @@ impl Bench {
             metric,
             stop: STOP,
         };
-        let seen = &loaded.instance.scene.observation;
-        let (depth, mask) = (seen.depth().clone(), seen.mask().clone());
-        let observation = Observation::new(depth, mask, *seen.camera())?;
+        let observation = loaded.instance.scene.observe_again();
         // The time of the normals is not measured here.
         black_box(observation.n_surfels());
         let start = Instant::now();
@@ -315,7 +284,7 @@ impl Bench {
             "items": items,
             "iterations": outcome.iterations,
             "ended": outcome.termination.name(),
-            "pose": numbers(&outcome.camera_from_object),
+            "pose": matrix(&outcome.camera_from_object),
         })
     }
 }
@@ -355,7 +324,7 @@ fn fused(loaded: &Loaded) -> Result<Value, Failure> {
         "ns": nanoseconds(start),
         "items": loaded.every_pixel.len(),
         "iterations": iterations,
-        "pose": numbers(&pose),
+        "pose": matrix(&pose),
     }))
 }
 

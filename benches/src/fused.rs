@@ -339,14 +339,10 @@ mod avx2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{OBJECTS, case};
-    use hybrid_icp::association::{
-        DataAssociation, PointSelection, Projective, Stride, VisibleSurface,
-    };
+    use crate::{OBJECTS, case, selected};
+    use hybrid_icp::association::{DataAssociation, Projective, Stride, VisibleSurface};
     use hybrid_icp::core::{Correspondences, Problem};
-    use hybrid_icp::icp::Workspace;
     use hybrid_icp::metric::{ErrorMetric, PointToPlane};
-    use hybrid_icp::raster::Rasterizer;
 
     /// The steps of the loop and of the traits differ by at most 10⁻⁴ of the motion.
     #[test]
@@ -358,11 +354,9 @@ mod tests {
         for object in OBJECTS {
             let case = case(object);
             let problem = Problem::new(&case.scene.model, &case.scene.observation);
-            let mut workspace = Workspace::new(Rasterizer::default());
-            let mut context = workspace.context(&problem);
-            let mut source = Vec::new();
             let mut every_pixel = VisibleSurface::with_stride(Stride::Pixels(1));
-            every_pixel.select(&mut context, &case.init, &mut source);
+            let (source, mut workspace) = selected(&case.scene, &case.init, &mut every_pixel);
+            let mut context = workspace.context(&problem);
             let mut pairs = Correspondences::new();
             pairs.begin(&case.init, source.len());
             Projective.associate(&mut context, &source, &case.init, &mut pairs);

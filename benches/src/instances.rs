@@ -4,14 +4,12 @@
 
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb_by_mean, rng};
 use hicp_tests::{Scene, camera, render};
-use hybrid_icp::association::{PointSelection, Stride, VisibleSurface};
+use hybrid_icp::association::{Stride, VisibleSurface};
 use hybrid_icp::core::internal::index;
-use hybrid_icp::core::{
-    Isometry3, Model, ModelConfig, Observation, Problem, Surfel, Translation3, TriMesh,
-};
-use hybrid_icp::icp::Workspace;
+use hybrid_icp::core::{Isometry3, Model, ModelConfig, Observation, Surfel, Translation3, TriMesh};
 use hybrid_icp::nalgebra::center;
-use hybrid_icp::raster::Rasterizer;
+
+use crate::selected;
 
 /// The objects. None has a symmetry, so that a rotation error is meaningful.
 pub const OBJECTS: [Household; 5] = [
@@ -68,19 +66,13 @@ pub fn instance(number: usize, noise_percent: f64) -> Instance {
     let depth = noise.apply(&mut rng, &depth);
     let init = perturb_by_mean(&mut rng, &truth);
     let observation = Observation::new(depth, mask, camera).expect("sizes agree");
-    let mut source = Vec::new();
-    let mut workspace = Workspace::new(Rasterizer::default());
-    let mut selection = VisibleSurface::with_stride(Stride::AboutPoints(POINTS));
-    selection.select(
-        &mut workspace.context(&Problem::new(&model, &observation)),
-        &init,
-        &mut source,
-    );
     let scene = Scene {
         model,
         observation,
         truth,
     };
+    let mut selection = VisibleSurface::with_stride(Stride::AboutPoints(POINTS));
+    let (source, _) = selected(&scene, &init, &mut selection);
     Instance {
         object: object.name(),
         scene,

@@ -2,13 +2,16 @@
 
 pub mod fused;
 pub mod instances;
+pub mod peer;
 pub mod stages;
 pub mod work;
 
 use hicp_sim::{Household, perturb_by_mean, rng};
 use hicp_tests::Scene;
-use hybrid_icp::core::{Isometry3, Problem};
+use hybrid_icp::association::PointSelection;
+use hybrid_icp::core::{Isometry3, Problem, Surfel};
 use hybrid_icp::icp::Workspace;
+use hybrid_icp::raster::Rasterizer;
 
 /// A scene and a start at the paper's mean initialization error.
 #[derive(Debug)]
@@ -36,6 +39,20 @@ pub fn case(object: Household) -> Case {
 
 /// Objects that the benches measure: a body with a handle, a thin one, and a flat box.
 pub const OBJECTS: [Household; 3] = [Household::Mug, Household::Hammer, Household::Carton];
+
+/// Returns the points that a selection selects, and a workspace with their render.
+#[must_use]
+pub fn selected(
+    scene: &Scene,
+    init: &Isometry3<f64>,
+    selection: &mut dyn PointSelection,
+) -> (Vec<Surfel>, Workspace) {
+    let mut workspace = Workspace::new(Rasterizer::default());
+    let problem = Problem::new(&scene.model, &scene.observation);
+    let mut source = Vec::new();
+    selection.select(&mut workspace.context(&problem), init, &mut source);
+    (source, workspace)
+}
 
 /// Fills a workspace's render cache with poses that no run requests.
 ///

@@ -1,5 +1,6 @@
 //! Cluttered scenes: several objects on a table, observed by a depth sensor.
 
+use hicp_core::internal::bounds;
 use hicp_core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, Point3, TriMesh, UnitQuaternion, Vector3,
 };
@@ -299,12 +300,7 @@ fn resting(rng: &mut SimRng) -> UnitQuaternion<f64> {
 /// Returns the center and the radius of the disc below a rotated mesh, and its lowest height.
 fn footprint(mesh: &TriMesh, rotation: &UnitQuaternion<f64>) -> ((f64, f64), f64, f64) {
     let turned = || mesh.vertices().iter().map(|v| rotation * v.cast::<f64>());
-    let mut low = Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
-    let mut high = -low;
-    for point in turned() {
-        low = low.inf(&point);
-        high = high.sup(&point);
-    }
+    let [low, high] = bounds(turned()).unwrap_or_default();
     let center = (0.5 * (low.x + high.x), 0.5 * (low.y + high.y));
     let distances = turned().map(|p| (p.x - center.0).hypot(p.y - center.1));
     (center, distances.fold(0.0, f64::max), low.z)

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use hicp_bop::chain;
 use hicp_io::{LengthUnit, MeshFile};
+use hybrid_icp::core::internal::bounds;
 use hybrid_icp::core::{Facing, MeshSurvey, Model, SurfaceColor};
 use serde::Serialize;
 
@@ -83,13 +84,7 @@ impl Report {
         let (facing, step) = (mesh.facing(), mesh.coordinate_step());
         let model = Model::new(mesh);
         let (mesh, diameter_m) = (model.mesh(), model.diameter());
-        let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        for vertex in mesh.used_points() {
-            for axis in 0..3 {
-                bounds[0][axis] = bounds[0][axis].min(vertex[axis]);
-                bounds[1][axis] = bounds[1][axis].max(vertex[axis]);
-            }
-        }
+        let bounds = bounds(mesh.used_points()).unwrap_or_default();
         let suspected = suspected_unit(diameter_m, arguments.unit);
         let mut report = Self {
             file: arguments.file.display().to_string(),
@@ -104,7 +99,7 @@ impl Report {
                 None => "none",
             },
             warnings: Vec::new(),
-            bounding_box_m: bounds,
+            bounding_box_m: bounds.map(|corner| corner.coords.into()),
             area_m2: mesh.area(),
             facing: match facing {
                 Facing::Outward => "outward",

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 
 use hybrid_icp::core::Isometry3;
+use hybrid_icp::icp::Alternative;
 use hybrid_icp::pipeline::PipelineFile;
-use hybrid_icp::{Preset, Refiner, Trace};
+use hybrid_icp::{Preset, Refinement, Refiner, Trace};
 use pyo3::prelude::*;
 
 use crate::array::{self, Motion};
@@ -286,17 +287,10 @@ impl PyPipeline {
         let (object, observation) = (model.get(), observation.get());
         self.warn_of(py, object, observation, &init)?;
         let mut watch = Watch::new(observer)?;
-        let mut refiner = self.take()?;
-        let refinement = py.detach(|| {
-            refiner.refine_observed(
-                &object.model,
-                &observation.observation,
-                &init.isometry,
-                &mut watch,
-            )
-        });
-        let others = refiner.alternatives().to_vec();
-        self.put_back([refiner]);
+        let (seen, start) = (&observation.observation, &init.isometry);
+        let (refinement, others) = self.run(py, |refiner| {
+            refiner.refine_observed(&object.model, seen, start, &mut watch)
+        })?;
         let stages = watch.finish()?.stages;
         results::result(model, &init, &refinement, &stages, &others)
     }
@@ -350,24 +344,12 @@ impl PyPipeline {
         // Without depth, any distance in front of the camera will do.
         let distance = observation.median_depth.unwrap_or(1.0);
         self.warn(py, object, observation, &[distance], colors)?;
-        let mut refiner = self.take()?;
-        let (refinement, trace) = py.detach(|| {
-            let mut trace = Trace::new();
-            let (model, observation) = (&object.model, &observation.observation);
-            (
-                refiner.estimate_observed(model, observation, &mut trace),
-                trace,
-            )
-        });
-        let others = refiner.alternatives().to_vec();
-        self.put_back([refiner]);
-        results::result(
-            model,
-            &Motion::new(Isometry3::identity()),
-            &refinement,
-            &trace.stages,
-            &others,
-        )
+        let (seen, mut trace) = (&observation.observation, Trace::new());
+        let (refinement, others) = self.run(py, |refiner| {
+            refiner.estimate_observed(&object.model, seen, &mut trace)
+        })?;
+        let init = Motion::new(Isometry3::identity());
+        results::result(model, &init, &refinement, &trace.stages, &others)
     }
 
     /// Judges a pose as it is, for example a fused one or that of another library.
@@ -403,10 +385,10 @@ impl PyPipeline {
         let pose = array::motion(T_co, "T_co")?;
         let (object, observation) = (model.get(), observation.get());
         self.warn(py, object, observation, &[object.z_at(&pose)], false)?;
-        let mut refiner = self.take()?;
-        let judged =
-            py.detach(|| refiner.judge(&object.model, &observation.observation, &pose.isometry));
-        self.put_back([refiner]);
+        let seen = &observation.observation;
+        let (judged, _) = self.run(py, |refiner| {
+            refiner.judge(&object.model, seen, &pose.isometry)
+        })?;
         results::result(model, &pose, &judged, &[], &[])
     }
 
@@ -505,14 +487,8 @@ impl PyPipeline {
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Pickled> {
         let this = slf.get();
         let maker = slf.get_type().getattr("_restore")?.unbind();
-        Ok((
-            maker,
-            (
-                this.origin.clone(),
-                this.toml.clone(),
-                this.overrides.clone(),
-            ),
-        ))
+        let (origin, toml) = (this.origin.clone(), this.toml.clone());
+        Ok((maker, (origin, toml, this.overrides.clone())))
     }
 
     /// Restores a pipeline from its pickled arguments.
@@ -540,9 +516,8 @@ impl PyPipeline {
                 .any(|p| text.contains(p))
         };
         let colors = of_colors(&toml) || overrides.iter().any(|text| of_colors(text));
-        let words = std::iter::once(origin).chain(overrides.iter().map(String::as_str));
         Ok(Self {
-            name: words.collect::<Vec<_>>().join(" "),
+            name: [&[origin.to_owned()], &overrides[..]].concat().join(" "),
             origin: origin.to_owned(),
             file,
             toml,
@@ -555,6 +530,19 @@ impl PyPipeline {
     /// Builds the pipeline.
     pub(crate) fn build(&self) -> PyResult<hybrid_icp::BoxedStage> {
         self.file.build().map_err(errors::input)
+    }
+
+    /// Runs a refiner without the GIL. Returns the result and the other poses that it found.
+    fn run(
+        &self,
+        py: Python<'_>,
+        run: impl FnOnce(&mut Refiner) -> Refinement + Send,
+    ) -> PyResult<(Refinement, Vec<Alternative>)> {
+        let mut refiner = self.take()?;
+        let refinement = py.detach(|| run(&mut refiner));
+        let others = refiner.alternatives().to_vec();
+        self.put_back([refiner]);
+        Ok((refinement, others))
     }
 
     /// Returns a refiner that is not in use, or a new one.

@@ -6,7 +6,7 @@ use hicp_association::{
     AllSamples, MaxDistance, NearestNeighbor, SearchIndex, Stride, estimate_normals,
     voxel_downsample,
 };
-use hicp_core::internal::{coordinate_step, named};
+use hicp_core::internal::{bounds, coordinate_step, named};
 use hicp_core::{
     Cloud, Isometry3, Matrix6, Point3, Problem, Source, Surfel, Target, UnitVector3, UnknownName,
     Vector3,
@@ -411,10 +411,8 @@ fn warnings_of(side: CloudSide, cloud: &Cloud) -> impl Iterator<Item = CloudWarn
     let estimated = estimated.map(|neighbors| CloudWarning::NormalsEstimated { side, neighbors });
     let points = cloud.surfels().iter().map(|surfel| surfel.point);
     let step = coordinate_step(points.clone());
-    let corners = points
-        .map(|p| (p, p))
-        .reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)));
-    let coarse = corners.is_some_and(|(low, high)| step > COARSE * f64::from((high - low).amax()));
+    let coarse =
+        bounds(points).is_some_and(|[low, high]| step > COARSE * f64::from((high - low).amax()));
     let coarse = coarse.then_some(CloudWarning::CoarseCoordinates { side, step });
     skipped.into_iter().chain(estimated).chain(coarse)
 }

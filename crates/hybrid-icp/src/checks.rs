@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_4;
 
+use hicp_core::internal::bounds;
 use hicp_core::{Isometry3, Model, Observation, PinholeCamera, diameter, se3};
 use hicp_icp::Alternative;
 use hicp_score::Flatness;
@@ -281,14 +282,8 @@ pub fn warning_of_runner_up(runner_up: &Alternative) -> Option<Warning> {
 
 /// Returns the area of the smallest side of the model's box along its axes, m²: 0 for a sheet.
 fn smallest_side(model: &Model) -> f64 {
-    let vertices: Vec<_> = model.mesh().used_points().collect();
-    let mut sides = [0, 1, 2].map(|axis| {
-        let along = vertices.iter().map(|p| f64::from(p[axis]));
-        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-            (low.min(x), high.max(x))
-        });
-        (high - low).max(0.0)
-    });
+    let [low, high] = bounds(model.mesh().used_points()).unwrap_or_default();
+    let mut sides: [f64; 3] = (high.cast::<f64>() - low.cast::<f64>()).into();
     sides.sort_by(f64::total_cmp);
     sides[0] * sides[1]
 }

@@ -1,6 +1,6 @@
 //! Masks from bounding boxes: the measured pixels of a box without the plane around it.
 
-use hicp_core::internal::DepthPlane;
+use hicp_core::internal::{self, DepthPlane};
 use hicp_core::{DepthImage, Mask, PinholeCamera, PixelRegion, Vector3};
 
 /// Growth of the box on every side, relative to its longer side. The pixels around the box show
@@ -112,8 +112,7 @@ impl Plane {
         let mut median = |plane: &DepthPlane| {
             residuals.clear();
             residuals.extend(pixels.iter().map(|pixel| distance(plane, pixel)));
-            let middle = residuals.len() / 2;
-            *residuals.select_nth_unstable_by(middle, f64::total_cmp).1
+            internal::median(&mut residuals, f64::total_cmp).unwrap_or(f64::INFINITY)
         };
         let planes = DepthPlane::through_three(&pixels, ROUNDS);
         let scored = planes.map(|plane| (median(&plane), plane));

@@ -1,5 +1,6 @@
 //! Downsampling of point clouds.
 
+use hicp_core::internal::bounds;
 use hicp_core::{Point3, UnitVector3, Vector3};
 
 /// Cells along one axis that fit into the key of a cell.
@@ -24,9 +25,7 @@ pub fn voxel_downsample(
     edge: f32,
 ) -> (Vec<Point3<f32>>, Option<Vec<UnitVector3<f32>>>) {
     let finite = |p: &&Point3<f32>| p.iter().all(|x| x.is_finite());
-    let first = points.iter().find(finite).copied().unwrap_or_default();
-    let (min, max) = (points.iter().filter(finite))
-        .fold((first, first), |(min, max), p| (min.inf(p), max.sup(p)));
+    let [min, max] = bounds(points.iter().filter(finite).copied()).unwrap_or_default();
     let inverse = 1.0 / f64::from(edge);
     let cells = (max.cast::<f64>() - min.cast::<f64>()).max() * inverse;
     let fits = edge > 0.0 && cells < MAX_CELLS;

@@ -17,13 +17,6 @@ pub(crate) fn nth_smallest(values: &mut [f32], rank: usize) -> Option<f32> {
     Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
-/// Returns the median: of an even number of values, the upper of the two middle ones.
-///
-/// Reorders `values`. Without values, returns `None`.
-pub(crate) fn median(values: &mut [f32]) -> Option<f32> {
-    nth_smallest(values, values.len() / 2)
-}
-
 /// Returns ⌈fraction·count⌉, between 0 and `count`; 0 for NaN.
 pub(crate) fn share_of(fraction: f32, count: usize) -> usize {
     // The f32 nearest to 0.85 lies above it, but 85 of 100 are meant.

@@ -1,9 +1,9 @@
 //! Rejection by the median absolute deviation.
 
-use hicp_core::internal::Scratch;
+use hicp_core::internal::{Scratch, median};
 use hicp_core::{Correspondences, Iteration};
 
-use crate::filter::distances::{collect_finite, median};
+use crate::filter::distances::collect_finite;
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -51,11 +51,11 @@ impl OutlierFilter for MadDistance {
     fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let distances = &mut self.distances.0;
         collect_finite(pairs, distances);
-        let center = median(distances).unwrap_or(0.0);
+        let center = median(distances, f32::total_cmp).unwrap_or(0.0);
         for distance in &mut *distances {
             *distance = (*distance - center).abs();
         }
-        let deviation = SIGMA_PER_MAD * median(distances).unwrap_or(0.0);
+        let deviation = SIGMA_PER_MAD * median(distances, f32::total_cmp).unwrap_or(0.0);
         keep_within(
             pairs,
             center + self.factor * deviation.max(self.floor.max(0.0)),

@@ -1,9 +1,9 @@
 //! Rejection by a multiple of the median distance.
 
-use hicp_core::internal::Scratch;
+use hicp_core::internal::{Scratch, median};
 use hicp_core::{Correspondences, Iteration};
 
-use crate::filter::distances::{collect_finite, median};
+use crate::filter::distances::collect_finite;
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
 
@@ -43,7 +43,10 @@ impl OutlierFilter for MedianDistance {
     fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
         let distances = &mut self.distances.0;
         collect_finite(pairs, distances);
-        keep_within(pairs, self.factor * median(distances).unwrap_or(0.0));
+        keep_within(
+            pairs,
+            self.factor * median(distances, f32::total_cmp).unwrap_or(0.0),
+        );
     }
 
     fn name(&self) -> &'static str {

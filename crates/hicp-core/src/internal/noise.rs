@@ -1,5 +1,6 @@
 //! The noise of a depth image.
 
+use crate::internal::median;
 use crate::sensor::observation::Observation;
 
 /// Returns the standard deviation of the depth noise inside the mask, meters.
@@ -21,11 +22,7 @@ pub(crate) fn depth_noise(observation: &Observation) -> f64 {
             differences.push((z - 0.5 * (left + right)).abs());
         }
     }
-    if differences.is_empty() {
-        return 0.0;
-    }
-    let middle = differences.len() / 2;
-    let median = *differences.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let median = median(&mut differences, f32::total_cmp).unwrap_or(0.0);
     // Of independent errors, the distance is larger by √1.5, and the median is 0.6745 of them.
     f64::from(median) / (0.6745 * 1.5_f64.sqrt())
 }

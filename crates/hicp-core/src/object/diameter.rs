@@ -2,6 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::internal::bounds;
+
 const LEAF_SIZE: usize = 16;
 
 /// Returns the largest distance between two of the points: a model's diameter as BOP defines it.
@@ -42,7 +44,7 @@ fn farthest_pair(points: &mut [Point3<f64>], first: Point3<f64>) -> Search<'_> {
         best = best.max((farthest - from).norm_squared());
         from = farthest;
     }
-    let (min, max) = bounds(points);
+    let [min, max] = bounds(points.iter().copied()).unwrap_or_default();
     let root = Node::build(points, 0, &nalgebra::center(&min, &max));
     let mut search = Search {
         points,
@@ -51,13 +53,6 @@ fn farthest_pair(points: &mut [Point3<f64>], first: Point3<f64>) -> Search<'_> {
     };
     search.visit(&root, &root);
     search
-}
-
-fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
-    let first = (points[0], points[0]);
-    points
-        .iter()
-        .fold(first, |(min, max), p| (min.inf(p), max.sup(p)))
 }
 
 struct Node {
@@ -79,7 +74,7 @@ impl Node {
     /// `start` is the index of the first point in the whole set. Coinciding points become a leaf of
     /// one.
     fn build(points: &mut [Point3<f64>], start: usize, middle_of_all: &Point3<f64>) -> Self {
-        let (min, max) = bounds(points);
+        let [min, max] = bounds(points.iter().copied()).unwrap_or_default();
         let end = start + if min == max { 1 } else { points.len() };
         let axis = (max - min).imax();
         let children = (points.len() > LEAF_SIZE && max[axis] > min[axis]).then(|| {

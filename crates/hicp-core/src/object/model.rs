@@ -4,6 +4,7 @@ use nalgebra::Point3;
 
 use crate::derived::Derived;
 use crate::id::Id;
+use crate::internal::bounds;
 use crate::object::diameter::diameter;
 use crate::object::mesh::TriMesh;
 use crate::object::sampling::sample_surface;
@@ -68,10 +69,7 @@ impl Model {
     #[must_use]
     pub fn with_config(mesh: TriMesh, config: ModelConfig) -> Self {
         let used: Vec<Point3<f32>> = mesh.used_points().collect();
-        let first = used.first().copied().unwrap_or_else(Point3::origin);
-        let (min, max) = used
-            .iter()
-            .fold((first, first), |(min, max), p| (min.inf(p), max.sup(p)));
+        let [min, max] = bounds(used.iter().copied()).unwrap_or_default();
         let center = nalgebra::center(&min.cast::<f64>(), &max.cast::<f64>());
         let radius = used
             .iter()

@@ -33,23 +33,21 @@ impl Interval {
 
     /// Returns the interval of the value minus a constant.
     pub(crate) fn minus(self, constant: f64) -> Self {
-        let [estimate, low, high] = self.ends().map(|x| x - constant);
-        Self {
-            estimate,
-            low,
-            high,
-            cases: self.cases,
-        }
+        self.map(|x| x - constant)
     }
 
     /// Returns the interval of a constant minus the value.
     pub(crate) fn from(self, constant: f64) -> Self {
-        let [estimate, high, low] = self.ends().map(|x| constant - x);
+        self.map(|x| constant - x)
+    }
+
+    fn map(self, change: impl Fn(f64) -> f64) -> Self {
+        let [estimate, a, b] = self.ends().map(change);
         Self {
             estimate,
-            low,
-            high,
-            cases: self.cases,
+            low: a.min(b),
+            high: a.max(b),
+            ..self
         }
     }
 }

@@ -10,6 +10,6 @@ mod tables;
 pub use curve::{Curve, Panel};
 pub use figure::Figure;
 pub use html::{Table, escaped as html_escaped, page as html_page};
-pub(crate) use page::note_on_intervals;
 pub use page::{Document, Entry, ReportOf, Reported};
+pub(crate) use page::{note_on_intervals, table};
 pub(crate) use tables::{differences, figures, fixed, means, texts};

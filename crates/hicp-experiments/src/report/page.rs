@@ -54,6 +54,18 @@ pub trait Reported: Design {
     fn document(entries: &[Entry<Self>]) -> Document;
 }
 
+/// Returns a table with the rows of all studies, below column names separated by `|`.
+pub(crate) fn table<D>(
+    entries: &[Entry<D>],
+    head: &str,
+    rows: impl Fn(&Entry<D>) -> Vec<Vec<String>>,
+) -> Table {
+    Table {
+        rows: entries.iter().flat_map(rows).collect(),
+        ..Table::headed(head)
+    }
+}
+
 /// Returns the part of the note that every report has, as HTML.
 pub(crate) fn note_on_intervals() -> String {
     format!(

@@ -10,8 +10,8 @@ use super::rule::PlainCovariance;
 use crate::analysis::{Analysis, FAILURE_VSD, Metric};
 use crate::claims::{Claim, listed};
 use crate::report::{
-    Curve, Document, Entry, Figure, Panel, Reported, Table, differences, figures, fixed, means,
-    note_on_intervals, texts,
+    Curve, Document, Entry, Figure, Panel, Reported, differences, figures, fixed, means,
+    note_on_intervals, table, texts,
 };
 
 const AVERAGE: &str = "average";
@@ -89,11 +89,9 @@ impl Reported for TrajectoryConfig {
     }
 
     fn document(entries: &[Entry<Self>]) -> Document {
-        let table = |head, rows: fn(&Entry<Self>) -> Vec<Vec<String>>| Table {
-            rows: entries.iter().flat_map(rows).collect(),
-            ..Table::headed(head)
-        };
-        let calibration = table(calibration::HEAD, |entry| calibration::rows(&entry.study));
+        let calibration = table(entries, calibration::HEAD, |entry| {
+            calibration::rows(&entry.study)
+        });
         let tables = entries.iter().map(|entry| means(&entry.analysis).html());
         let means: String = tables.collect();
         let results = format!(
@@ -112,9 +110,9 @@ impl Reported for TrajectoryConfig {
             note: note(entries.iter().any(is_real)),
             figures: vec![("figure", as_in_paper, Figure::new(rows))],
             results,
-            differences: table(DIFFERENCES, Entry::differences),
+            differences: table(entries, DIFFERENCES, Entry::differences),
             tables: vec![
-                ("summary.csv", table(SUMMARY, Entry::summary)),
+                ("summary.csv", table(entries, SUMMARY, Entry::summary)),
                 ("calibration.csv", calibration),
             ],
         }

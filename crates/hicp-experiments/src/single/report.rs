@@ -10,7 +10,7 @@ use crate::analysis::{Analysis, Interval, Metric, percent};
 use crate::claims::Claim;
 use crate::report::{
     Curve, Document, Entry, Figure, Panel, Reported, Table, differences, figures, fixed,
-    html_escaped, means, note_on_intervals, texts,
+    html_escaped, means, note_on_intervals, table, texts,
 };
 
 const YARDSTICK: &str = "nn-point-to-point";
@@ -51,10 +51,6 @@ impl Reported for Config {
              image and mask to pose. It includes normals and search trees. Compare only its ratios.",
             note_on_intervals()
         );
-        let table = |head, rows: fn(&Entry<Self>) -> Vec<Vec<String>>| Table {
-            rows: entries.iter().flat_map(rows).collect(),
-            ..Table::headed(head)
-        };
         Document {
             title: "The single-image studies of Hybrid ICP, rerun",
             note,
@@ -63,10 +59,10 @@ impl Reported for Config {
                 ("alpha", "The threshold α", figure(true)),
             ],
             results: entries.iter().map(Entry::results).collect(),
-            differences: table(DIFFERENCES, Entry::differences),
+            differences: table(entries, DIFFERENCES, Entry::differences),
             tables: vec![
-                ("summary.csv", table(SUMMARY, Entry::summary)),
-                ("switches.csv", table(SWITCHES, Entry::switches)),
+                ("summary.csv", table(entries, SUMMARY, Entry::summary)),
+                ("switches.csv", table(entries, SWITCHES, Entry::switches)),
             ],
         }
     }

@@ -1,6 +1,6 @@
 //! Robust kernels over any metric.
 
-use hicp_core::internal::Scratch;
+use hicp_core::internal::{Scratch, median};
 use hicp_core::{Correspondences, Iteration, Pair};
 
 use crate::decorator::kernel::{Kernel, RobustKernel};
@@ -100,12 +100,7 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
                         .filter(|(pair, _)| pair.weight > 0.0)
                         .map(|(_, residual)| *residual),
                 );
-                let middle = self.sorted.0.len() / 2;
-                if self.sorted.0.is_empty() {
-                    return None;
-                }
-                let (_, median, _) = self.sorted.0.select_nth_unstable_by(middle, f64::total_cmp);
-                let sigma = SIGMA_PER_MAD * *median;
+                let sigma = SIGMA_PER_MAD * median(&mut self.sorted.0, f64::total_cmp)?;
                 if !sigma.is_finite() {
                     return None;
                 }

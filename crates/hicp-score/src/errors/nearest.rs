@@ -1,5 +1,6 @@
 //! Exact distances to the nearest of many points.
 
+use hicp_core::internal::bounds;
 use hicp_core::{Isometry3, Point3};
 
 /// Points per leaf: few enough to prune, and enough for a short scan per leaf.
@@ -95,12 +96,9 @@ impl NearestPoints {
 ///
 /// Stores the boxes.
 fn divide(points: &mut [Point3<f64>], node: usize, boxes: &mut Vec<[Point3<f64>; 2]>) {
-    let Some(first) = points.first().copied() else {
+    let Some([min, max]) = bounds(points.iter().copied()) else {
         return;
     };
-    let (min, max) = points
-        .iter()
-        .fold((first, first), |(min, max), p| (min.inf(p), max.sup(p)));
     if boxes.len() <= node {
         boxes.resize(node + 1, [Point3::origin(); 2]);
     }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use hicp_core::internal::Surroundings;
+use hicp_core::internal::{Surroundings, median};
 use hicp_core::{Observation, PinholeCamera, PixelRegion};
 
 use crate::mve::distances::to_zero;
@@ -226,9 +226,5 @@ fn middle_of(depths: &[f32], distances: &[f32]) -> f32 {
     let pixels = depths.iter().zip(distances);
     let within = pixels.filter(|(z, distance)| **z > 0.0 && **distance >= inner.max(1.0));
     let mut inside: Vec<f32> = within.map(|(z, _)| *z).collect();
-    if inside.is_empty() {
-        return f32::INFINITY;
-    }
-    let middle = inside.len() / 2;
-    *inside.select_nth_unstable_by(middle, f32::total_cmp).1
+    median(&mut inside, f32::total_cmp).unwrap_or(f32::INFINITY)
 }

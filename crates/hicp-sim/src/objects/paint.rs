@@ -1,5 +1,6 @@
 //! Procedural textures of objects.
 
+use hicp_core::internal::bounds;
 use hicp_core::{ColorImage, MeshError, SurfaceColor, TexturedTriangle, TriMesh};
 use rand::RngExt;
 
@@ -111,9 +112,7 @@ fn color(rng: &mut SimRng) -> [u8; 3] {
 
 /// Projects each triangle on the side of the bounding box that it faces.
 fn project(mesh: &TriMesh) -> Vec<TexturedTriangle> {
-    let first = mesh.vertices()[0];
-    let used = mesh.vertices().iter();
-    let (low, high) = used.fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+    let [low, high] = bounds(mesh.vertices().iter().copied()).unwrap_or_default();
     let width = (high - low).amax();
     let place = |corner: f32, axis: usize| (corner - low[axis]) / width;
     (0..mesh.triangles().len())

@@ -1,6 +1,6 @@
 //! Options that the commands over datasets share.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
@@ -8,6 +8,7 @@ use hicp_io::IoError;
 use hicp_io::bop::Dataset;
 
 use crate::limits::limits;
+use crate::options::file_name;
 
 /// The options that choose images of a dataset.
 #[derive(Clone, Debug, Args)]
@@ -50,12 +51,6 @@ impl DatasetOptions {
         let root = self.root.canonicalize();
         file_name(root.as_deref().unwrap_or(&self.root))
     }
-}
-
-/// Returns the name of a file or a folder, for people.
-pub(crate) fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    name.to_string_lossy().into_owned()
 }
 
 /// The option for the number of threads.

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::faults;
 use super::follow::FollowOptions;
-use super::statistics::median;
+use super::statistics::{count, median};
 use crate::options::positive;
 use crate::pose_json::add_pose;
 use crate::terminal::{progress_bar, say};
@@ -123,8 +123,8 @@ impl Arguments {
                 Ok(image) => {
                     let camera = image.camera;
                     tracker.set_camera(camera);
-                    let (width, height) = (camera.width(), camera.height());
-                    if nothing.width() != width || nothing.height() != height {
+                    let (width, height) = camera.size();
+                    if nothing.size() != camera.size() {
                         let pixels = vec![0.0; camera.region().area()];
                         nothing = Arc::new(DepthImage::from_meters(width, height, pixels)?);
                     }
@@ -175,14 +175,7 @@ impl Line {
 
 /// Counts the images by state, and adds the median time.
 fn summarize(lines: &[Line]) -> String {
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    for line in lines {
-        *counts.entry(line.tracked.state.name()).or_default() += 1;
-    }
-    let counts = counts.iter();
-    let mut text: String = counts
-        .map(|(state, count)| format!("\n  {count:>7}  {state}"))
-        .collect();
+    let mut text = count(lines.iter().map(|line| line.tracked.state.name()));
     let mut times: Vec<f64> = lines.iter().map(|line| 1e3 * line.seconds).collect();
     if let Some(median) = median(&mut times) {
         text.push_str(&format!("\n  median time {median:.1} ms"));

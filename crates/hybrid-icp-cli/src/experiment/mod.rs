@@ -15,6 +15,7 @@ use hybrid_icp::core::UnknownName;
 use self::study::{StudyOptions, report};
 use crate::choice::Source;
 use crate::limits::pipeline_limits;
+use crate::options::file_name;
 use crate::terminal::warn;
 
 /// Rerun the paper's studies, on household objects or on custom meshes.
@@ -163,11 +164,7 @@ fn variants(experiment: Experiment, choices: &[Choice]) -> anyhow::Result<Vec<Va
 
 /// Writes the report of studies, which are named after their folders.
 fn report_folders(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
-    let name = |folder: &PathBuf| {
-        let name = folder.file_name().unwrap_or(folder.as_os_str());
-        name.to_string_lossy().into_owned()
-    };
-    let names: Vec<String> = folders.iter().map(name).collect();
+    let names: Vec<String> = folders.iter().map(|folder| file_name(folder)).collect();
     let studies = names.iter().zip(folders);
     let studies: Vec<_> = studies.map(|(name, folder)| (&**name, &**folder)).collect();
     report::<Config>(&studies, out)

@@ -163,15 +163,8 @@ impl PyCamera {
 
     fn __getnewargs__(&self) -> (f64, f64, f64, f64, u32, u32) {
         let camera = &self.0;
-        let (width, height) = (camera.width(), camera.height());
-        (
-            camera.fx(),
-            camera.fy(),
-            camera.cx(),
-            camera.cy(),
-            width,
-            height,
-        )
+        let [fx, fy, cx, cy] = [camera.fx(), camera.fy(), camera.cx(), camera.cy()];
+        (fx, fy, cx, cy, camera.width(), camera.height())
     }
 
     fn __repr__(&self) -> String {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use hybrid_icp::core::{DepthImage, Isometry3, Mask};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, internal};
 use numpy::ndarray::ArrayView2;
 use numpy::{
     AllowTypeChange, PyArrayDescrMethods, PyArrayLike2, PyReadonlyArray2, PyUntypedArray,
@@ -273,7 +273,7 @@ pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyRe
     } else {
         return Err(refuse());
     };
-    if size != (depth.width(), depth.height()) {
+    if size != depth.size() {
         return Err(InputError::new_err(format!(
             "mask is {}, expected the shape of depth, ({}, {})",
             array::describe(value),
@@ -303,8 +303,7 @@ fn warn_of_labels(value: &Bound<'_, PyAny>, mask: &ArrayView2<'_, u8>) -> PyResu
 /// Returns the median of the positive depths, or `None` if there are none.
 pub(crate) fn median(depths: impl Iterator<Item = f32>) -> Option<f32> {
     let mut positive: Vec<f32> = depths.filter(|z| *z > 0.0).collect();
-    let middle = positive.len() / 2;
-    (middle < positive.len()).then(|| *positive.select_nth_unstable_by(middle, f32::total_cmp).1)
+    internal::median(&mut positive, f32::total_cmp)
 }
 
 /// Returns the strides that visit at most 64 × 64 pixels of an area.

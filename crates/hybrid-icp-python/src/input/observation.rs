@@ -169,8 +169,7 @@ impl PyObservation {
         let mask = depth::mask(mask, &image)?;
         let camera = camera.0;
         check_size(&camera, depth, &image)?;
-        let size = (image.width(), image.height());
-        let color = color.map(|value| color::image(value, "color", Some(size)));
+        let color = color.map(|value| color::image(value, "color", Some(image.size())));
         let color = color.transpose()?;
         let window = normal_window.map_or(NormalWindow::Automatic, NormalWindow::HalfSide);
         py.detach(|| Self::make(image, mask, camera, color, window))

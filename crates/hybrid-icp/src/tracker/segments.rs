@@ -1,5 +1,6 @@
 //! The surfaces around a place that may be a lost object.
 
+use hicp_core::internal::median;
 use hicp_core::{DepthImage, Mask, PinholeCamera, PixelRegion, Point3};
 
 /// Number of cells across an object.
@@ -185,7 +186,9 @@ impl Cells {
                         measured.extend(depth.get(u, v).filter(|z| *z > 0.0 && inside));
                     }
                 }
-                let median = median(&mut measured, side * side / 2).unwrap_or(0.0);
+                let median = median(&mut measured, f32::total_cmp);
+                let enough = measured.len() >= side * side / 2;
+                let median = median.filter(|_| enough).unwrap_or(0.0);
                 if median > 0.0 {
                     let sum: f32 = measured.iter().map(|z| (z - median).abs()).sum();
                     deviations.push(sum / (measured.len() as f32 * median));
@@ -196,7 +199,7 @@ impl Cells {
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depths.
         let jump = (JUMP_DIAMETERS * diameter) as f32;
         // The mean distance from the median is 0.8 standard deviations.
-        let noise = f64::from(median(&mut deviations, 1).unwrap_or(0.0)) / 0.8;
+        let noise = f64::from(median(&mut deviations, f32::total_cmp).unwrap_or(0.0)) / 0.8;
         // A median of n values deviates by 1.25 / √n.
         let cell_noise = JUMP_DEVIATIONS * 1.25 * 2_f64.sqrt() / side as f64 * noise;
         let pixel_noise = PIXEL_DEVIATIONS * noise;
@@ -266,15 +269,6 @@ impl Cells {
             area >= LEAST_AREA * diameter * diameter && extent <= EXTENT_DIAMETERS * diameter;
         fits.then_some((mean, area))
     }
-}
-
-/// Returns the median if there are at least as many values.
-fn median(values: &mut [f32], at_least: usize) -> Option<f32> {
-    if values.len() < at_least.max(1) {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 /// Returns the part of the image that a sphere can cover.

@@ -26,7 +26,7 @@ use row::{Rays, Row};
 pub use size::NormalWindow;
 use window::{ColumnSums, Fit};
 
-use crate::internal::vectorized;
+use crate::internal::{median, vectorized};
 use crate::surfel::Surfel;
 
 /// A step is a depth edge if it is steeper than a surface at this angle, degrees off frontal …
@@ -138,10 +138,6 @@ fn relative_noise(patch: &DepthPatch<'_>) -> f64 {
             u -= width;
         }
     }
-    if differences.is_empty() {
-        return 0.0;
-    }
-    let middle = differences.len() / 2;
-    let (_, median, _) = differences.select_nth_unstable_by(middle, f32::total_cmp);
-    f64::from(*median) / (0.6745 * 6.0_f64.sqrt())
+    let median = median(&mut differences, f32::total_cmp).unwrap_or(0.0);
+    f64::from(median) / (0.6745 * 6.0_f64.sqrt())
 }

@@ -11,8 +11,9 @@ use super::dots::dot_plot;
 use super::interval::interval;
 use super::worst::Worst;
 use crate::bop::eval::{self, Summary};
-use crate::bop::options::{DatasetOptions, file_name};
+use crate::bop::options::DatasetOptions;
 use crate::bop::refine::MaskOptions;
+use crate::options::file_name;
 
 /// Result files of one dataset: the initial one, and that of every pipeline.
 #[derive(Serialize)]

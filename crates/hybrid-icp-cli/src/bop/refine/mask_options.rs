@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use hicp_bop::{BoxMask, MaskSource};
 
-use crate::bop::options::file_name;
 use crate::limits::limits;
+use crate::options::file_name;
 
 /// The options that choose the masks of rows; those of the ground truth by default.
 #[derive(Debug, Args)]

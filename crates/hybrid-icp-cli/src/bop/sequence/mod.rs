@@ -4,7 +4,7 @@ mod camera_path;
 mod line;
 mod tracker;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ use self::line::Line;
 use self::tracker::Tracker;
 use super::advice::{advice, is_about_diameter};
 use super::follow::FollowOptions;
-use super::statistics::median;
+use super::statistics::{count, median};
 use super::{faults, models};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
@@ -211,14 +211,7 @@ fn check_object(scene: &Scene, path: &[(u32, CameraMotion)], object: u32) -> any
 ///
 /// If there is ground truth, adds the distances from it, which show the effect of fusion.
 fn summarize(lines: &[Line]) -> String {
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    for line in lines {
-        *counts.entry(line.description).or_default() += 1;
-    }
-    let counts = counts.iter();
-    let mut text: String = counts
-        .map(|(what, count)| format!("\n  {count:>7}  {what}"))
-        .collect();
+    let mut text = count(lines.iter().map(|line| line.description));
     let mve = lines.iter().filter_map(|line| line.single.as_ref()?.1);
     if let Some(median) = median(&mut mve.collect::<Vec<_>>()) {
         text.push_str(&format!("\n  median MVE {median:.3}"));

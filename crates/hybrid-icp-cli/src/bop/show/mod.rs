@@ -17,10 +17,10 @@ use self::estimates::{Estimates, Inspection};
 use self::lines::{grid, lines};
 use self::picture::{Scenery, outlines, with_legend};
 use super::eval::DELTA_MM;
-use super::options::{DatasetOptions, file_name};
+use super::options::DatasetOptions;
 use super::{faults, models};
 use crate::limits::limits;
-use crate::options::positive;
+use crate::options::{file_name, positive};
 use crate::outputs::{Files, check_png, write_picture};
 use crate::terminal::{say, table, warn};
 
@@ -224,14 +224,11 @@ impl Arguments {
             return Ok(Picture::shaded(&image.depth, &image.camera)?);
         };
         let color = limits().read_color(&path)?;
-        let (width, height) = (color.width(), color.height());
-        let expected = (image.depth.width(), image.depth.height());
-        if (width, height) != expected {
+        let ((width, height), (w, h)) = (color.size(), image.depth.size());
+        if (width, height) != (w, h) {
             bail!(
-                "{} is {width}x{height} pixels, expected {}x{} as the depth image",
-                path.display(),
-                expected.0,
-                expected.1
+                "{} is {width}x{height} pixels, expected {w}x{h} as the depth image",
+                path.display()
             );
         }
         Ok(Picture {
