@@ -1,4 +1,4 @@
-//! What the programs that other libraries are compared with have in common.
+//! The protocol of the programs that are compared with other libraries.
 
 use std::io::{BufRead as _, Write as _};
 use std::path::Path;

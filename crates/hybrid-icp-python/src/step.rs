@@ -3,7 +3,7 @@
 use hybrid_icp::core::{
     Correspondences, Isometry3, Iteration, Pair, Point3, Surfel, UnitVector3, Vector3,
 };
-use hybrid_icp::metric::{Minimize, PointToPlane, PointToPoint, Step};
+use hybrid_icp::metric::{Minimize, PointToPlane, PointToPoint};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
@@ -45,9 +45,7 @@ pub(crate) fn point_to_point_step(
     sources: &Bound<'_, PyAny>,
     targets: &Bound<'_, PyAny>,
 ) -> PyResult<(Matrix, f64)> {
-    let pairs = pairs(sources, targets, None)?;
-    let step = PointToPoint.minimize(&Iteration::default(), &pairs);
-    finish(step, pairs.len())
+    step(PointToPoint, &pairs(sources, targets, None)?)
 }
 
 /// Computes one step of point-to-plane ICP on given pairs.
@@ -81,13 +79,13 @@ pub(crate) fn point_to_plane_step(
     targets: &Bound<'_, PyAny>,
     normals: &Bound<'_, PyAny>,
 ) -> PyResult<(Matrix, f64)> {
-    let pairs = pairs(sources, targets, Some(normals))?;
-    let step = PointToPlane.minimize(&Iteration::default(), &pairs);
-    finish(step, pairs.len())
+    step(PointToPlane, &pairs(sources, targets, Some(normals))?)
 }
 
-fn finish(step: Option<Step>, count: usize) -> PyResult<(Matrix, f64)> {
+fn step(mut metric: impl Minimize, pairs: &Correspondences) -> PyResult<(Matrix, f64)> {
+    let step = metric.minimize(&Iteration::default(), pairs);
     let step = step.ok_or_else(|| {
+        let count = pairs.len();
         InputError::new_err(format!(
             "the {count} pairs do not determine a step, expected pairs that fix all six degrees of \
              freedom"

@@ -347,9 +347,8 @@ impl PyObservation {
         let median_depth = masked_median(&observation, down, right)
             .or_else(|| masked_median(&observation, 1, 1))
             .map(f64::from);
-        let mask = observation.mask().pixels();
         Ok(Self {
-            pixels: mask.iter().filter(|set| **set).count(),
+            pixels: observation.mask().n_set(),
             observation,
             median_depth,
         })
