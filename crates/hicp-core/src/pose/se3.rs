@@ -169,7 +169,6 @@ pub fn join(rho: &Vector3<f64>, phi: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
 }
 
-/// Assembles [a b; 0 d].
 /// Returns the matrix [a b; 0 d].
 #[must_use]
 pub fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {

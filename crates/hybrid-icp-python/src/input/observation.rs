@@ -23,7 +23,7 @@ fn check_size(
     depth: &Bound<'_, PyAny>,
     image: &DepthImage,
 ) -> PyResult<()> {
-    if (camera.width(), camera.height()) == (image.width(), image.height()) {
+    if camera.size() == image.size() {
         return Ok(());
     }
     Err(InputError::new_err(format!(
