@@ -109,12 +109,15 @@ impl Found {
 
     /// Returns whether the image shows the object at the pose, given that it was expected there.
     ///
-    /// The confidence excuses an unexplained surface around the object, such as a table.
+    /// The confidence excuses an unexplained surface around the object, such as a table, and
+    /// contradictions such as edges that a sensor measures at a wrong place.
     pub(super) fn explains(&self) -> bool {
         let ends = self.contour() > 0.2 || self.fills(0.06, 0.1);
         let alone = ends && self.unexplained() < 0.5;
-        let agrees = self.evidence.agrees > 0.15 && self.contradiction() < 0.2;
-        agrees && (alone || self.confidence > EXPECTED)
+        let expected = self.confidence > EXPECTED;
+        let limit = if expected { 0.45 } else { 0.2 };
+        let agrees = self.evidence.agrees > 0.15 && self.contradiction() < limit;
+        agrees && (alone || expected)
     }
 
     /// Returns whether most of the object is hidden at the pose.
@@ -133,7 +136,7 @@ impl Found {
         let usual = (ends || self.fills(0.04, 0.05)) && self.confidence >= SURE;
         let accurate = self.noise < LOW_NOISE && (contour > 0.2 || unexplained < 0.6);
         let likely = accurate && self.confidence >= LIKELY;
-        self.explains() && self.contradiction() < 0.1 && (usual || likely)
+        self.explains() && self.contradiction() < 0.2 && (usual || likely)
     }
 
     /// Returns whether no other pose needs to be tried.
