@@ -23,6 +23,7 @@ const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, t an
 ///   `translation`, `position`, `cam_t_m2c`).
 /// - An object with a translation and a quaternion: `quaternion_xyzw`, `quaternion_wxyz`, or
 ///   `quaternion`, `orientation` or `rotation` with the members x, y, z and w.
+/// - A pose or one transform of ROS, such as a `TFMessage` with one entry.
 /// - A TUM line of text: the time, if any, then x, y, z, qx, qy, qz, qw.
 ///
 /// `unit` is the unit of the translation. `None` means millimeters for `cam_t_m2c` and meters for
@@ -82,6 +83,13 @@ fn form(root: &Value) -> Option<Result<Parts, String>> {
     let member = |keys: &[&str]| keys.iter().find_map(|key| root.get(*key));
     if let Some(matrix) = member(&["matrix", "transform", "pose", "T", "transformation"]) {
         return form(matrix);
+    }
+    // A message of ROS has a list.
+    if let Some([only]) = member(&["transforms"])
+        .and_then(Value::as_array)
+        .map(Vec::as_slice)
+    {
+        return form(only);
     }
     if root.is_array() || root.get("data").is_some() {
         return match numbers(root)?[..] {

@@ -156,6 +156,7 @@ fn poses_of_every_form_are_the_same() {
         "pose_wxyz.json",
         "pose_xyzw.json",
         "pose_ros.yaml",
+        "pose_tf.json",
     ] {
         check(name, None, 1.0);
         check(name, Some(LengthUnit::Millimeters), 0.001);
@@ -168,6 +169,7 @@ fn poses_of_every_form_are_the_same() {
 fn a_quaternion_of_unknown_order_and_other_files_are_refused() {
     for (name, found) in [
         ("pose_unordered.json", "quaternion of stated order"),
+        ("pose_two_tfs.json", "the keys \"transforms\""),
         ("camera_k.txt", "9 numbers"),
         ("camera_rows.json", "the keys \"K\""),
         ("photo.jpg", "a JPEG image"),
