@@ -41,6 +41,9 @@ pub struct MaskFile {
     pub warning: Option<String>,
     /// With a warning: the distinct values but 0 in ascending order, at most 256.
     pub values: Vec<f64>,
+    /// The least value on the object if the mask is soft: 0 if some values are negative, or else
+    /// half of the largest value.
+    pub threshold: f64,
 }
 
 /// Reads a mask of any supported format, recognized by its first bytes.
@@ -80,12 +83,13 @@ impl ReadLimits {
             MaskRule::Equal(number) => value == number,
         };
         let pixels: Vec<bool> = values.clone().map(selected).collect();
-        let (mut warning, mut distinct) = (None, Vec::new());
+        let (mut warning, mut distinct, mut threshold) = (None, Vec::new(), 0.0);
         if rule == MaskRule::NotZero {
             let found = Values::of(values);
             let no_background = !found.distinct.iter().any(|value| is_background(*value));
             warning = found.warning(no_background);
             if warning.is_some() {
+                threshold = found.threshold();
                 distinct = found.distinct;
                 distinct.retain(|value| !is_background(*value));
             }
@@ -106,6 +110,7 @@ impl ReadLimits {
             mask,
             warning,
             values,
+            threshold,
         })
     }
 }
@@ -193,18 +198,35 @@ impl Values {
         if count <= 2 && !(count == 2 && no_background) {
             return None;
         }
-        let most = self.distinct.last().copied().unwrap_or(1.0);
-        // Half of 255 is 128, and half of 1 is 0.5.
-        let half = if most > 1.0 {
-            (most / 2.0).ceil()
-        } else {
-            most / 2.0
-        };
-        let half = shown(if most >= MaskRule::COLOR { 1.0 } else { half });
         Some(format!(
-            "{}, and all but 0 count as the object: choose with --mask-threshold {half} (at least) or \
+            "{}, and all but 0 count as the object: choose with --mask-threshold {} (at least) or \
              --mask-value N (a label)",
-            self.names()
+            self.names(),
+            shown(self.threshold())
         ))
+    }
+
+    /// Returns the least value on the object of a soft mask, with at most three digits.
+    fn threshold(&self) -> f64 {
+        let value = |at: Option<&f64>| at.copied().unwrap_or(1.0);
+        match (value(self.distinct.first()), value(self.distinct.last())) {
+            (..0.0, _) => 0.0,
+            (_, MaskRule::COLOR..) => 1.0,
+            // Half of 255 is 128, and half of 1 is 0.5.
+            (_, most) if most > 1.0 => (most / 2.0).ceil(),
+            (_, most) => format!("{:.2e}", most / 2.0).parse().unwrap_or(0.5),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thresholds_have_few_digits() {
+        let threshold = |most: f64| Values::of([0.0, most].into_iter()).threshold();
+        let found = [f64::from(0.93_f32), 1.0, 3.0, 255.0].map(threshold);
+        assert_eq!(found, [0.465, 0.5, 2.0, 128.0]);
     }
 }

@@ -138,17 +138,30 @@ fn masks_of_two_values_need_no_option() {
 
 #[test]
 fn masks_of_more_values_are_read_with_a_warning_that_names_the_options() {
-    for (name, values) in [
-        ("mask_soft.png", "the values 0, 42, 127, 212 and 255, and"),
-        ("mask_labels.png", "the values 0, 1 and 3, and"),
-        ("mask_palette.png", "the values 0, 1 and 3, and"),
-        ("mask_colors.png", "the values 0, #3c0000 and #b40000, and"),
-        ("mask_probabilities.npy", "the values 0.025, 0.275"),
+    for (name, values, threshold) in [
+        (
+            "mask_soft.png",
+            "the values 0, 42, 127, 212 and 255, and",
+            128.0,
+        ),
+        ("mask_labels.png", "the values 0, 1 and 3, and", 2.0),
+        ("mask_palette.png", "the values 0, 1 and 3, and", 2.0),
+        (
+            "mask_colors.png",
+            "the values 0, #3c0000 and #b40000, and",
+            1.0,
+        ),
+        ("mask_probabilities.npy", "the values 0.025, 0.275", 0.5),
+        ("mask_logits.npy", "the values -4.5, -1.5", 0.0),
     ] {
-        let warning = read_mask(fixture(name), MaskRule::NotZero).unwrap().warning;
-        let warning = warning.unwrap_or_else(|| panic!("{name}: no warning"));
+        let file = read_mask(fixture(name), MaskRule::NotZero).unwrap();
+        let warning = file.warning.unwrap_or_else(|| panic!("{name}: no warning"));
         assert!(warning.contains(values), "{name}: {warning}");
-        assert!(warning.contains("--mask-threshold") && warning.contains("--mask-value"));
+        assert!(
+            warning.contains(&format!("--mask-threshold {threshold} ")),
+            "{warning}"
+        );
+        assert!(warning.contains("--mask-value") && file.threshold == threshold);
     }
 }
 
@@ -157,6 +170,7 @@ fn a_threshold_or_a_value_selects_the_object() {
     for (name, rule) in [
         ("mask_soft.png", MaskRule::AtLeast(127.0)),
         ("mask_probabilities.npy", MaskRule::AtLeast(0.5)),
+        ("mask_logits.npy", MaskRule::AtLeast(0.0)),
         ("mask_labels.png", MaskRule::Equal(3.0)),
         ("mask_palette.png", MaskRule::Equal(3.0)),
     ] {

@@ -248,7 +248,7 @@ fn option(fault: &Fault, unit: LengthUnit, depth_scale: f64) -> Option<String> {
     }
 }
 
-/// Selects the object in a mask of many values: the label, or half of the largest value.
+/// Selects the object in a mask of many values: by its label, or by a threshold.
 ///
 /// Returns the fault and the observation with that mask. The label is the one that the model at the
 /// initial pose explains best.
@@ -261,20 +261,16 @@ fn many_values(
     let Region::Mask(path, MaskRule::NotZero) = &inputs.region else {
         return Ok(None);
     };
-    let values = limits().read_mask(path, MaskRule::NotZero)?.values;
+    let read = limits().read_mask(path, MaskRule::NotZero)?;
+    let (values, threshold) = (read.values, read.threshold);
     let most = values.last().copied().unwrap_or(0.0);
-    let half = if most > 1.0 {
-        (most / 2.0).ceil()
-    } else {
-        most / 2.0
-    };
     let may_be_labels = values.len() <= MOST_LABELS;
     let labels = values
         .iter()
         .filter(|label| may_be_labels && label.fract() == 0.0);
     let mut rules: Vec<MaskRule> = labels.copied().map(MaskRule::Equal).collect();
-    if most < MaskRule::COLOR {
-        rules.push(MaskRule::AtLeast(half));
+    if (threshold..MaskRule::COLOR).contains(&most) {
+        rules.push(MaskRule::AtLeast(threshold));
     }
     let mut refiner = Refiner::preset(Preset::Local);
     let mut best: Option<(f64, Observation, MaskRule)> = None;
@@ -312,7 +308,7 @@ fn many_values(
                 format!("--mask-value '#{:06x}'", color as u32),
             )
         }
-        _ => ("mask_soft", "soft", format!("--mask-threshold {half}")),
+        _ => ("mask_soft", "soft", format!("--mask-threshold {threshold}")),
     };
     let (path, n) = (path.display(), values.len());
     let named = Named {
