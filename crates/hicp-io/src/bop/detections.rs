@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Deserializer};
 
 use super::rle::Rle;
-use crate::error::IoError;
+use crate::error::{IoError, Place};
 use crate::json::{self, optional_numbers};
 use crate::limits::{Limit, ReadLimits};
 
@@ -30,6 +30,12 @@ pub struct Detection {
     #[serde(rename = "time", default, deserialize_with = "known_time")]
     pub time_s: Option<f64>,
 }
+
+/// The expected value, for files of COCO with `images` and `annotations`, which have no scene.
+const FROM_COCO: &str = "an array of detections; of the annotations of COCO for scene 1, it is made by \
+    python3 -c \"import json, sys; \
+    print(json.dumps([{'scene_id': 1, 'score': 1, **a} for a in json.load(sys.stdin)['annotations']]))\" \
+    < coco.json > detections.json";
 
 /// Reads a time in seconds. BOP writes −1 for an unknown time.
 fn known_time<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
@@ -56,14 +62,20 @@ impl ReadLimits {
     ///
     /// As for [`read_detections`].
     pub fn read_detections(&self, path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
-        json::read(self, path.as_ref(), Limit::JSON_BYTES)
+        let read = json::read(self, path.as_ref(), Limit::JSON_BYTES);
+        read.map_err(|mut error: IoError| {
+            let at_root = error.place == Some(Place::Field("$".to_owned()));
+            if at_root && error.found == "an object" {
+                error.expected = FROM_COCO.to_owned();
+            }
+            error
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Place;
 
     fn read(segmentation: &str) -> Result<Vec<Detection>, IoError> {
         let dir = tempfile::tempdir().unwrap();
@@ -92,6 +104,12 @@ mod tests {
 
     #[test]
     fn errors_name_the_field_and_the_value() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("coco.json");
+        std::fs::write(&path, r#"{"images": [], "annotations": []}"#).unwrap();
+        let error = read_detections(&path).unwrap_err();
+        assert_eq!(error.found, "an object");
+        assert!(error.expected.contains("['annotations']"), "{error}");
         let error = read(r#"{"size": [3, 2], "counts": [4, 5]}"#).unwrap_err();
         assert_eq!(
             error.place,
