@@ -90,11 +90,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     arguments.check_files()?;
     let masks = arguments.masks.source()?;
     let mut comparison = Comparison::new(&arguments.dataset, &arguments.results, &arguments.masks);
-    comparison.add(
-        INITIAL,
-        arguments.evaluate(INITIAL, &arguments.results)?,
-        None,
-    );
+    let initial = arguments.evaluate(INITIAL, &arguments.results)?;
+    // The targets are the same for all.
+    let left_out = initial.left_out();
+    comparison.add(INITIAL, initial, None);
     for (name, pipeline) in pipelines {
         let output = out.join(format!("{name}.csv"));
         let job = RefineJob {
@@ -131,8 +130,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Table { head, rows, .. } = comparison.overall();
     let lines: Vec<_> = std::iter::once(head).chain(rows).collect();
     let page = out.join(format!("{COMPARISON}.html"));
+    let left_out = left_out.map_or_else(String::new, |text| format!("\n{text}"));
     say(format_args!(
-        "{}\n\n{} has the tables by object",
+        "{}{left_out}\n\n{} has the tables by object",
         table(&lines, 1),
         page.display()
     ))

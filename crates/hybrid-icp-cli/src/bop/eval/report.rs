@@ -129,15 +129,18 @@ impl Report {
         let recalls = recalls.map(|(mm, recall)| format!("{mm} mm {recall:.3}"));
         let recalls: Vec<String> = recalls.collect();
         text.push_str(&format!("\nrecall of MSSD below {}", recalls.join(", ")));
-        if self.left_out > 0 {
-            let count = self.left_out;
-            text.push_str(&format!(
-                "\n{count} targets could not be evaluated and are left out"
-            ));
+        if let Some(left_out) = self.left_out() {
+            text.push_str(&format!("\n{left_out}"));
         }
         if let Some(calibration) = &self.calibration {
             text.push_str(&format!("\n{}", calibration.table()));
         }
         text
+    }
+
+    /// Reports the targets that could not be evaluated, if there are any.
+    pub(crate) fn left_out(&self) -> Option<String> {
+        let count = self.left_out;
+        (count > 0).then(|| format!("{count} targets could not be evaluated and are left out"))
     }
 }

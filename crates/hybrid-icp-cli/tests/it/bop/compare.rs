@@ -166,14 +166,19 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
 
     // The masks are those of `bop refine`, and only the given targets count.
     let (rows, targets) = (document["entries"][0]["targets"].as_u64(), "targets.json");
-    let first = r#"[{"scene_id": 1, "im_id": 0, "obj_id": OBJ, "inst_count": 1}]"#;
+    let first = r#"[{"scene_id": 1, "im_id": 0, "obj_id": OBJ, "inst_count": 1},
+                    {"scene_id": 1, "im_id": 99, "obj_id": OBJ, "inst_count": 1}]"#;
     let id = objects.keys().next().unwrap();
     std::fs::write(folder.join(targets), first.replace("OBJ", id)).unwrap();
     let options = "--mask none --no-color --models models --targets targets.json";
     let words = format!(
         "bop compare --dataset set --results set/initial_synthetic-test.csv --pipelines hybrid --out boxes {options}"
     );
-    run(folder, words.split(' ')).exits(0);
+    let told = run(folder, words.split(' ')).exits(0);
+    assert!(
+        told.out
+            .contains("\n1 targets could not be evaluated and are left out\n")
+    );
     let path = folder.join("boxes/compare.json");
     let boxes: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
     assert!(rows > Some(1) && boxes["entries"][0]["targets"] == 1);
