@@ -156,7 +156,7 @@ const COUNTED: usize = 256;
 
 /// The distinct values of a mask.
 struct Values {
-    /// In ascending order.
+    /// In ascending order, with the smallest and the largest one.
     distinct: Vec<f64>,
     /// Whether there are more than [`COUNTED`].
     more: bool,
@@ -170,9 +170,16 @@ impl Values {
             if last.replace(value) != Some(value)
                 && let Err(at) = distinct.binary_search_by(|other| other.total_cmp(&value))
             {
-                match distinct.len() < COUNTED {
-                    true => distinct.insert(at, value),
-                    false => more = true,
+                if distinct.len() < COUNTED {
+                    distinct.insert(at, value);
+                    continue;
+                }
+                // The first and the last value are those of the whole image.
+                more = true;
+                match at {
+                    0 => distinct[0] = value,
+                    COUNTED => distinct[COUNTED - 1] = value,
+                    _ => {}
                 }
             }
         }
@@ -224,9 +231,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thresholds_have_few_digits() {
+    fn thresholds_have_few_digits_and_follow_all_values() {
         let threshold = |most: f64| Values::of([0.0, most].into_iter()).threshold();
         let found = [f64::from(0.93_f32), 1.0, 3.0, 255.0].map(threshold);
         assert_eq!(found, [0.465, 0.5, 2.0, 128.0]);
+        // The largest number is found after more than 256 others, and the smallest one after it.
+        let many = (0..300).map(|i| 0.1 + 1e-4 * f64::from(i));
+        let found = Values::of(many.chain([0.9, 0.05, 0.3]));
+        assert!(found.names().ends_with("values from 0.05 to 0.9") && found.threshold() == 0.45);
     }
 }
