@@ -19,7 +19,8 @@ use hicp_io::bop::Dataset;
 use hicp_sim::{Household, perturb, stream};
 use hicp_tests::tabletop::{MaskKind, Tabletop};
 use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, TriMesh, Vector3,
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Quaternion, Translation3,
+    TriMesh, UnitQuaternion, Vector3,
 };
 use hybrid_icp::{Diagnosis, Fault, Preset, Refiner};
 use rand::RngExt;
@@ -41,7 +42,7 @@ struct Inputs {
 type Injected = (&'static str, &'static str, fn(Inputs) -> Inputs);
 
 #[rustfmt::skip]
-const FAULTS: [Injected; 39] = [
+const FAULTS: [Injected; 43] = [
     ("mesh: mm read as m", "the mesh is 1000 times too large", |i| i.mesh(1e3, false)),
     ("mesh: m read as mm", "the mesh is 1000 times too small", |i| i.mesh(1e-3, false)),
     ("mesh: cm read as m", "the mesh is 100 times too large", |i| i.mesh(1e2, false)),
@@ -86,6 +87,14 @@ const FAULTS: [Injected; 39] = [
     ("pose: OpenGL", "the pose is that of an OpenGL camera", |i| {
         i.poses(|pose| Isometry3::rotation(PI * Vector3::x()) * pose)
     }),
+    ("pose: wxyz read as xyzw", "the quaternion of the pose is w, x, y, z", |i| {
+        i.quaternions(|[x, y, z, w]| [w, x, y, z])
+    }),
+    ("pose: xyzw read as wxyz", "the quaternion of the pose is x, y, z, w", |i| {
+        i.quaternions(|[x, y, z, w]| [y, z, w, x])
+    }),
+    ("origin: at a corner", "the pose puts the object elsewhere", |i| i.origin(&[1.0, 1.0, 1.0])),
+    ("origin: below the object", "the pose puts the object elsewhere", |i| i.origin(&[0.0, 0.0, 1.0])),
     ("pose: m read as mm", "the translation of the pose is 1000 times too small", |i| {
         i.poses(|pose| Isometry3::from_parts((pose.translation.vector * 1e-3).into(), pose.rotation))
     }),
@@ -125,6 +134,21 @@ impl Inputs {
     fn poses(mut self, change: impl Fn(&Isometry3<f64>) -> Isometry3<f64>) -> Self {
         (self.truth, self.init) = (change(&self.truth), change(&self.init));
         self
+    }
+
+    /// Reorders x, y, z and w of the rotation.
+    fn quaternions(self, reorder: impl Fn([f64; 4]) -> [f64; 4]) -> Self {
+        self.poses(|pose| {
+            let [x, y, z, w] = reorder(pose.rotation.coords.into());
+            let rotation = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+            Isometry3::from_parts(pose.translation, rotation)
+        })
+    }
+
+    /// Makes the pose that of a model whose origin is moved by shares of the radius.
+    fn origin(self, radii: &[f64; 3]) -> Self {
+        let shift = self.model.radius() / 3_f64.sqrt() * Vector3::from(*radii);
+        self.poses(|pose| pose * Translation3::from(shift))
     }
 
     /// Replaces the depth at every pixel; `new` receives its column, row and depth (0 if missing).

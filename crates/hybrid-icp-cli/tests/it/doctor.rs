@@ -1,7 +1,7 @@
 //! `hybrid-icp doctor`.
 
 use hicp_io::{LengthUnit, pose_to_bop};
-use hybrid_icp::core::{DepthImage, Isometry3};
+use hybrid_icp::core::{DepthImage, Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::{Value, json};
 
 use crate::common::*;
@@ -104,6 +104,18 @@ fn wrong_poses_are_named() {
     let transposed =
         |pose: Isometry3<f64>| Isometry3::from_parts(pose.translation, pose.rotation.inverse());
     names(&posed(transposed), "rotation_transposed", None);
+    let reordered = |pose: Isometry3<f64>| {
+        let [x, y, z, w] = pose.rotation.coords.into();
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(z, w, x, y));
+        Isometry3::from_parts(pose.translation, rotation)
+    };
+    names(&posed(reordered), "quaternion_order", None);
+    let shift = Translation3::new(0.0, 0.1, 0.2);
+    let scene = posed(|pose| pose * shift);
+    names(&scene, "origin", None);
+    let found = &examine(&scene).1["faults"][0]["shift_meters"];
+    let error = (0..3).map(|axis| (found[axis].as_f64().unwrap() + shift.vector[axis]).abs());
+    assert!(error.fold(0.0, f64::max) < 0.01, "{found}");
 }
 
 #[test]

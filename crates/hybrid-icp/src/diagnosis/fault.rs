@@ -37,6 +37,16 @@ pub enum Fault {
     PoseInverted,
     /// The initial pose is in the frame of an OpenGL camera, which looks along −z with y up.
     OpenglPose,
+    /// The numbers of the pose's quaternion were read in the wrong order.
+    QuaternionOrder {
+        /// `true` if they are w, x, y, z, but were read as x, y, z, w; `false` for the reverse.
+        w_first: bool,
+    },
+    /// The initial pose has the right rotation, but is that of a model with another origin.
+    Origin {
+        /// The vector to add to the model's vertices: x, y and z in the object frame, meters.
+        shift_meters: [f64; 3],
+    },
     /// The camera's intrinsics belong to images of another resolution.
     ///
     /// The numbers are those of this image, pixels.
@@ -134,6 +144,28 @@ impl Fault {
                 "the pose is that of an OpenGL camera, with y up and −z ahead",
                 "multiply the pose by diag(1, -1, -1, 1) from the left",
             ),
+            Self::QuaternionOrder { w_first } => {
+                let [right, wrong] = match w_first {
+                    true => ["w, x, y, z", "x, y, z, w"],
+                    false => ["x, y, z, w", "w, x, y, z"],
+                };
+                let fault =
+                    format!("the quaternion of the pose is {right}, but was read as {wrong}");
+                (
+                    fault,
+                    format!("read the numbers of the quaternion as {right}"),
+                )
+            }
+            Self::Origin { shift_meters } => {
+                let [x, y, z] = shift_meters.map(|shift| Number((1e3 * shift).round() + 0.0));
+                (
+                    "the pose puts the object elsewhere: its model may have another origin"
+                        .to_owned(),
+                    format!(
+                        "if other images give about the same vector, add ({x}, {y}, {z}) mm to the vertices of the mesh; otherwise correct the translation of the pose"
+                    ),
+                )
+            }
             Self::Intrinsics { fx, fy, cx, cy } => {
                 let [fx, fy, cx, cy] = [fx, fy, cx, cy].map(Number);
                 let fault = "the intrinsics belong to images of another resolution".to_owned();

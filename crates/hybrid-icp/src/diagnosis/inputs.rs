@@ -3,7 +3,9 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use hicp_core::{DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Translation3};
+use hicp_core::{
+    DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, Translation3,
+};
 use hicp_raster::render_depth_image;
 
 /// A model, an image and an initial pose; all of them can be replaced.
@@ -86,6 +88,27 @@ impl Inputs<'_> {
     /// Returns the depth image of the model at the initial pose.
     pub(super) fn rendered(&self) -> DepthImage {
         render_depth_image(self.model.mesh(), &self.camera, &self.init)
+    }
+
+    /// Returns the point with the median coordinates of a depth image, in the camera frame, or
+    /// `None` without a measurement.
+    ///
+    /// `counts` receives the index of a pixel.
+    pub(super) fn middle(
+        &self,
+        depth: &DepthImage,
+        counts: impl Fn(usize) -> bool,
+    ) -> Option<Point3<f64>> {
+        let width = depth.width() as usize;
+        let pixels = depth.pixels().iter().enumerate();
+        let points = pixels.filter(|(i, z)| **z > 0.0 && counts(*i));
+        let points = points.map(|(i, z)| {
+            let (u, v) = ((i % width) as f64, (i / width) as f64);
+            self.camera.unproject(u, v, f64::from(*z))
+        });
+        let points: Vec<Point3<f64>> = points.collect();
+        let middle = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
+        Some(Point3::new(middle(0)?, middle(1)?, middle(2)?))
     }
 
     /// Returns the number of pixels of the mask.
