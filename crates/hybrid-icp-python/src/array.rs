@@ -7,6 +7,7 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use pyo3::types::PyString;
 
 use crate::errors::InputError;
 
@@ -58,8 +59,17 @@ pub(crate) fn choice<T, const N: usize>(
 
 /// Creates the error for a value of the wrong type or shape.
 pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
+    let reader = match name {
+        "depth" => "; read_depth reads a file",
+        "mask" => "; read_mask reads a file",
+        "T_co" => "; read_pose reads a file",
+        _ => "",
+    };
+    let is_path =
+        value.is_instance_of::<PyString>() || value.hasattr("__fspath__").unwrap_or(false);
+    let hint = if is_path { reader } else { "" };
     InputError::new_err(format!(
-        "{name} is {}, expected {expected}",
+        "{name} is {}, expected {expected}{hint}",
         describe(value)
     ))
 }

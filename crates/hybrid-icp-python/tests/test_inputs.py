@@ -25,12 +25,13 @@ WALL = np.full((48, 64), 0.8, np.float32)
         ((WALL.astype(np.int32), None, CAMERA), None, "depth is an array of int32 .* expected an .H, W. array of float32 meters"),
         ((WALL[None], None, CAMERA), None, r"depth is an array of float32 with shape \(1, 48, 64\)"),
         ((WALL.tolist(), None, CAMERA), None, "depth is a list, expected"),
-        ((WALL.T, None, CAMERA), None, r"camera is for 64x48 images but depth is .* shape \(64, 48\), expected shape \(48, 64\)"),
+        ((WALL.T, None, CAMERA), None, r"camera is for 64x48 images but depth is .* shape \(64, 48\), expected shape \(48, 64\); the size of a camera is"),
         ((WALL, np.ones((64, 48), bool), CAMERA), None, r"mask is .* shape \(64, 48\), expected the shape of depth, \(48, 64\)"),
         ((hi.DepthImage(WALL.T), None, CAMERA), None, r"depth is a DepthImage with shape \(64, 48\), expected shape \(48, 64\)"),
         ((hi.DepthImage(WALL), None, CAMERA), 0.001, "scale= was passed with depth as a DepthImage, .* expected scale= where"),
         ((hi.DepthImage(WALL), np.ones((64, 48), bool), CAMERA), None, r"mask is .* expected the shape of depth, \(48, 64\)"),
-        ((WALL, WALL, CAMERA), None, "mask is an array of float32 .* expected an .H, W. array of bool or uint8"),
+        ((WALL, "mask.png", CAMERA), None, "mask is a str, expected .*; read_mask reads a file"),
+        ((WALL, WALL, CAMERA), None, "mask is an array of float32 .* expected an .H, W. array of bool or uint8.*; pass mask > 0.5 for probabilities"),
     ],
 )
 def test_observation_errors_name_the_value(arguments, scale, message):
@@ -63,7 +64,7 @@ def test_units_are_checked_even_if_few_pixels_were_measured():
     ("value", "message"),
     [
         (np.eye(3), r"T_co is an array of float64 with shape \(3, 3\), expected a \(4, 4\) float64 matrix"),
-        ("pose", "T_co is a str, expected"),
+        ("pose", "T_co is a str, expected .*; read_pose reads a file"),
         ([[1, 2]], r"T_co is a list of shape \(1, 2\), expected"),
         (np.eye(4) * 2, "last row of a pose is 0 0 0 1"),
         (np.diag([1, 1, -1, 1.0]), "T_co: rotation has determinant -1"),
@@ -306,7 +307,7 @@ def test_files_of_numpy_are_read(tmp_path):
     np.save(tmp_path / "labels.npy", labels)
     assert np.array_equal(hi.read_mask(tmp_path / "labels.npy", value=3), labels == 3)
     assert np.array_equal(hi.read_mask(tmp_path / "labels.npy", threshold=2), labels >= 2)
-    with pytest.warns(hi.InputWarning, match="the values 0, 1, 2 and 3"):
+    with pytest.warns(hi.InputWarning, match="the values 0, 1, 2 and 3.* threshold=2 .* value=N"):
         assert np.array_equal(hi.read_mask(tmp_path / "labels.npy"), labels > 0)
     with pytest.raises(hi.InputError, match="both"):
         hi.read_mask(tmp_path / "labels.npy", threshold=1, value=1)

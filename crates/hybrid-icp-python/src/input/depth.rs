@@ -242,7 +242,8 @@ pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyRe
         return Ok(Mask::full(depth.width(), depth.height()));
     };
     let expected = "an (H, W) array of bool or uint8, not zero on the object, or of other integers \
-                    that are 0 and 1, or 0 and 255";
+                    that are 0 and 1, or 0 and 255; pass mask > 0.5 for probabilities, mask > 0 for \
+                    logits, or mask == N for a label image";
     let value = &array::as_array("mask", value)?;
     let refuse = || unexpected("mask", value, expected);
     let kind = value.cast::<PyUntypedArray>().map_err(|_| refuse())?;

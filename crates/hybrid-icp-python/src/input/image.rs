@@ -131,6 +131,9 @@ pub(crate) fn read_mask(
     let file = py.detach(|| hicp_io::read_mask(&path, rule));
     let file = file.map_err(errors::file)?;
     if let Some(warning) = file.warning {
+        // The options of the program are arguments here.
+        let warning = warning.replace("--mask-threshold ", "threshold=");
+        let warning = warning.replace("--mask-value ", "value=");
         errors::warn(py, &format!("{}: {warning}", path.display()))?;
     }
     Ok(depth::image(file.mask.width(), file.mask.pixels()))

@@ -26,8 +26,13 @@ fn check_size(
     if camera.size() == image.size() {
         return Ok(());
     }
+    let turned = (image.height(), image.width());
+    let hint = match camera.size() == turned {
+        true => "; the size of a camera is (width, height)",
+        false => "",
+    };
     Err(InputError::new_err(format!(
-        "camera is for {}x{} images but depth is {} with shape ({}, {}), expected shape ({}, {})",
+        "camera is for {}x{} images but depth is {} with shape ({}, {}), expected shape ({}, {}){hint}",
         camera.width(),
         camera.height(),
         array::kind(depth),
