@@ -205,8 +205,14 @@ impl Values {
         if count <= 2 && !(count == 2 && no_background) {
             return None;
         }
+        let has_colors = self.distinct.last() >= Some(&MaskRule::COLOR);
+        let photo = if self.more && has_colors {
+            ", as in a photo"
+        } else {
+            ""
+        };
         Some(format!(
-            "{}, and all but 0 count as the object: choose with --mask-threshold {} (at least) or \
+            "{}{photo}, and all but 0 count as the object: choose with --mask-threshold {} (at least) or \
              --mask-value N (a label)",
             self.names(),
             shown(self.threshold())

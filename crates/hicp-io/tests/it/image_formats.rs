@@ -153,6 +153,7 @@ fn masks_of_more_values_are_read_with_a_warning_that_names_the_options() {
         ),
         ("mask_probabilities.npy", "the values 0.025, 0.275", 0.5),
         ("mask_logits.npy", "the values -4.5, -1.5", 0.0),
+        ("picture.png", "#f8e628, as in a photo, and all", 1.0),
     ] {
         let file = read_mask(fixture(name), MaskRule::NotZero).unwrap();
         let warning = file.warning.unwrap_or_else(|| panic!("{name}: no warning"));
