@@ -121,7 +121,8 @@ impl EvalJob {
         }
         warnings.iter().for_each(warn);
         let targets: Vec<&Judged> = judged.iter().flat_map(|image| &image.targets).collect();
-        let ar_by_image = judged.iter().map(|image| {
+        let evaluated = judged.iter().filter(|image| !image.targets.is_empty());
+        let ar_by_image = evaluated.map(|image| {
             let of_image = Summary::of(&image.targets.iter().collect::<Vec<_>>());
             (of_image.ar * of_image.targets as f64, of_image.targets)
         });
