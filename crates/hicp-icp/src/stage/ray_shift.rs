@@ -1,5 +1,6 @@
 //! The baseline that moves an object along its viewing ray.
 
+use hicp_core::internal::median;
 use hicp_core::{Isometry3, Problem, Translation3};
 
 use crate::outcome::{Outcome, Termination};
@@ -49,13 +50,12 @@ impl Stage for RayShift {
                     let measured = measured.filter(|z| *z > 0.0 && rendered > 0.0);
                     measured.map(|z| f64::from(z) - f64::from(rendered))
                 }));
-            let middle = self.differences.len() / 2;
             let center = (pose * model.center()).coords;
-            if self.differences.is_empty() || center.z <= 0.0 {
+            let middle = median(&mut self.differences, f64::total_cmp);
+            let Some(middle) = middle.filter(|_| center.z > 0.0) else {
                 break;
-            }
-            let (_, median, _) = (self.differences).select_nth_unstable_by(middle, f64::total_cmp);
-            let shift = Translation3::from(center * (*median / center.z));
+            };
+            let shift = Translation3::from(center * (middle / center.z));
             outcome = Outcome::refined(shift * pose, Termination::Converged);
         }
         outcome

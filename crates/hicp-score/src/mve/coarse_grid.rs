@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use hicp_core::Observation;
-use hicp_core::internal::{VectorLoop, whole};
+use hicp_core::internal::{VectorLoop, median, whole};
 
 use crate::mve::agreement::all_bits;
 use crate::mve::trust_map::{CERTAIN, TrustMap};
@@ -131,8 +131,7 @@ fn median_around(fine: &Observation, (u, v): (u32, u32), factor: u32) -> Option<
             count += 1;
         }
     }
-    let window = &mut window[..count];
-    Some(*window.select_nth_unstable_by(count / 2, f32::total_cmp).1)
+    median(&mut window[..count], f32::total_cmp)
 }
 
 /// Number of pixels compared at once.

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use hicp_core::internal;
 use hicp_core::{
     DepthImage, Isometry3, Mask, Model, PinholeCamera, PixelRegion, Point3, Translation3,
 };
@@ -107,7 +108,7 @@ impl Inputs<'_> {
             self.camera.unproject(u, v, f64::from(*z))
         });
         let points: Vec<Point3<f64>> = points.collect();
-        let middle = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
+        let middle = |axis: usize| median(points.iter().map(|point| point[axis]));
         Some(Point3::new(middle(0)?, middle(1)?, middle(2)?))
     }
 
@@ -126,14 +127,13 @@ impl Inputs<'_> {
         let pixels = pixels.zip(self.mask.pixels());
         let pixels = pixels.filter(|((z, measured), set)| **set && **z > 0.0 && **measured > 0.0);
         let values = pixels.map(|((z, measured), _)| value((*z).into(), (*measured).into()));
-        median(values.collect())
+        median(values)
     }
 }
 
-/// Returns the upper median, or `None` of nothing.
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+/// Returns the median, or `None` of nothing.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    internal::median(&mut values.collect::<Vec<_>>(), f64::total_cmp)
 }
 
 /// Returns the number of a list that is nearest by ratio, if it is within a relative distance.

@@ -68,7 +68,7 @@ pub(super) fn depth_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
 pub(super) fn translation_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
     let pixels = inputs.depth.pixels().iter().zip(inputs.mask.pixels());
     let depths = pixels.filter(|(z, set)| **set && **z > 0.0);
-    let middle = median(depths.map(|(z, _)| f64::from(*z)).collect());
+    let middle = median(depths.map(|(z, _)| f64::from(*z)));
     let ratio = middle.map(|middle| middle / inputs.init.translation.z);
     let factor = ratio.and_then(|ratio| nearest(ratio, decimal(&[1.0]), 0.8));
     let factor = factor.filter(|factor| *factor != 1.0);

@@ -1,5 +1,6 @@
 //! The axis of the part of an object that is a surface of revolution.
 
+use hicp_core::internal::median;
 use hicp_core::internal::small::{eigen3, inverse3};
 use hicp_core::{Matrix3, Surfel, UnitVector3, Vector3};
 
@@ -53,8 +54,7 @@ pub(crate) fn axis_of(samples: &[Surfel], diameter: f64) -> Option<UnitVector3<f
             *deviation = (axis.dot(moment) + velocity.dot(normal)).abs();
         }
         let mut sorted = deviations.clone();
-        let (_, median, _) = sorted.select_nth_unstable_by(lines.len() / 2, f64::total_cmp);
-        limit = (2.0 * *median).max(AGREES);
+        limit = (2.0 * median(&mut sorted, f64::total_cmp)?).max(AGREES);
     }
     let agreeing = deviations.iter().filter(|d| **d <= AGREES).count();
     let enough = agreeing as f64 >= LEAST_SHARE * lines.len() as f64;
