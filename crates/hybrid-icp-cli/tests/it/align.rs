@@ -7,44 +7,28 @@ use crate::common::*;
 
 #[test]
 fn two_clouds_are_registered_and_the_result_is_an_initial_pose() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let motion = Isometry3::new(
         Vector3::new(0.3, 0.004, -0.003),
         Vector3::new(0.05, 0.03, 0.7),
     );
-    write_clouds(folder.path(), &motion);
+    write_clouds(&folder, &motion);
     let rough = motion
         * Isometry3::new(
             Vector3::new(0.002, 0.0, 0.001),
             Vector3::new(0.0, 0.04, 0.0),
         );
-    std::fs::write(
-        folder.path().join("pose.json"),
-        pose_json(&rough).to_string(),
-    )
-    .unwrap();
+    folder.write("pose.json", pose_json(&rough).to_string());
     for method in ["point-to-point", "point-to-plane", "gicp"] {
-        let words = [
-            "align",
-            "a.ply",
-            "b.pcd",
-            "--init",
-            "pose.json",
-            "--output",
-            "found.json",
-            "--method",
-            method,
-        ];
-        let run_ = run(folder.path(), words).exits(0);
+        let words =
+            format!("align a.ply b.pcd --init pose.json --output found.json --method {method}");
+        let run_ = folder.command(words).exits(0);
         assert!(run_.out.starts_with("refined: fitness "), "{}", run_.out);
-        assert!(
-            run_.err
-                .contains("target: no normals: estimated from 20 neighbors"),
-            "{}",
-            run_.err
+        assert_contains(
+            &run_.err,
+            &["target: no normals: estimated from 20 neighbors"],
         );
-        let text = std::fs::read_to_string(folder.path().join("found.json")).unwrap();
-        let found: Value = serde_json::from_str(&text).unwrap();
+        let found = folder.json("found.json");
         let (angle, distance) = se3::pose_distance(&pose_of(&found), &motion);
         assert!(
             angle.to_degrees() < 0.5 && distance < 1e-3,
@@ -56,51 +40,37 @@ fn two_clouds_are_registered_and_the_result_is_an_initial_pose() {
         );
         assert!(found["fitness"].as_f64().unwrap() > 0.95);
         assert_eq!(found["covariance"].as_array().unwrap().len(), 6);
-        let again = [
-            "align",
-            "a.ply",
-            "b.pcd",
-            "--init",
-            "found.json",
-            "--voxel",
-            "0.002",
-        ];
-        let again: Value = serde_json::from_str(&run(folder.path(), again).exits(0).out).unwrap();
+        let again = folder.command("align a.ply b.pcd --init found.json --voxel 0.002");
+        let again = again.exits(0).json();
         assert!(again["source_points"].as_u64().unwrap() < 3000);
     }
 }
 
 #[test]
 fn clouds_that_do_not_overlap_are_warned_of() {
-    let folder = tempfile::tempdir().unwrap();
-    write_clouds(folder.path(), &Isometry3::translation(5.0, 0.0, 0.0));
-    let run_ = run(folder.path(), ["align", "a.ply", "b.pcd"]).exits(0);
-    let found: Value = serde_json::from_str(&run_.out).unwrap();
+    let folder = Folder::new();
+    write_clouds(&folder, &Isometry3::translation(5.0, 0.0, 0.0));
+    let run_ = folder.command("align a.ply b.pcd").exits(0);
+    let found = run_.json();
     assert_eq!(
         (&found["outcome"], &found["rmse_m"]),
         (&json!("kept_initial"), &Value::Null)
     );
     assert_eq!(found["termination"], "no_pairs");
-    assert!(run_.err.contains("do not trust the pose"), "{}", run_.err);
+    assert_contains(&run_.err, &["do not trust the pose"]);
 }
 
 #[test]
 fn wrong_arguments_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    write_clouds(folder.path(), &Isometry3::identity());
-    let refused = |words: &[&str], part: &str| {
-        let run_ = run(folder.path(), [&["align", "a.ply"], words].concat());
+    let folder = Folder::new();
+    write_clouds(&folder, &Isometry3::identity());
+    let refused = |words: &str, part: &str| {
+        let run_ = folder.command(format!("align a.ply {words}"));
         assert!(run_.code != 0 && run_.err.contains(part), "{}", run_.err);
     };
-    refused(&["b.pcd", "--method", "gipc"], "did you mean \"gicp\"?");
-    refused(&["none.ply"], "none.ply");
-    refused(&["b.pcd", "--neighbors", "2"], "2 is not in 3..");
-    refused(
-        &["b.pcd", "--output", "b.pcd"],
-        "--output and TARGET both name",
-    );
-    refused(
-        &["b.pcd", "--voxel", "0"],
-        "expected a finite number above 0",
-    );
+    refused("b.pcd --method gipc", "did you mean \"gicp\"?");
+    refused("none.ply", "none.ply");
+    refused("b.pcd --neighbors 2", "2 is not in 3..");
+    refused("b.pcd --output b.pcd", "--output and TARGET both name");
+    refused("b.pcd --voxel 0", "expected a finite number above 0");
 }

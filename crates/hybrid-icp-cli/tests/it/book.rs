@@ -1,7 +1,6 @@
 //! The shell blocks of the book run, in order, in a folder with the files that they name.
 
 use std::path::Path;
-use std::process::Command;
 
 use hicp_io::LengthUnit;
 use hybrid_icp::core::{DepthImage, Isometry3, Mask, PinholeCamera};
@@ -140,23 +139,11 @@ fn run_page(name: &str) {
     hicp_io::write_depth_png(scene.path("depth.png"), &depth, 1.0).unwrap();
     std::fs::copy(scene.path("init.json"), scene.path("pose.json")).unwrap();
     write_other_formats(&scene, &depth);
-    write_clouds(scene.folder.path(), &truth());
-    let program = Path::new(env!("CARGO_BIN_EXE_hybrid-icp"));
-    let path = format!(
-        "{}:{}",
-        program.parent().unwrap().display(),
-        std::env::var("PATH").unwrap()
-    );
+    write_clouds(&scene, &truth());
     let blocks = blocks(&page, "sh");
     assert!(!blocks.is_empty(), "{name}: no `sh` block");
     for block in blocks {
-        let mut shell = Command::new("sh");
-        shell
-            .args(["-e", "-c", block])
-            .current_dir(scene.folder.path());
-        let output = shell.env("PATH", &path).output().unwrap();
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{name}: {block}\n{errors}");
+        run_script(scene.root(), block, name);
     }
 }
 

@@ -1,13 +1,13 @@
 //! Help, usage errors and closed pipes.
 
-use std::io::Read;
+use std::ffi::OsStr;
 use std::process::Stdio;
 
-use crate::common::{Scene, program, run};
+use crate::common::*;
 
 #[test]
 fn help_texts_have_80_columns_and_the_important_words() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     for (command, words) in [
         (
             "--help",
@@ -47,7 +47,7 @@ fn help_texts_have_80_columns_and_the_important_words() {
         ("inspect --help", &["--unit", "--json"]),
         ("pipelines --help", &["Usage"]),
     ] {
-        let help = run(folder.path(), command.split(' ')).exits(0).out;
+        let help = folder.command(command).exits(0).out;
         for word in words {
             assert!(help.contains(word), "no {word:?} in {command}");
         }
@@ -59,7 +59,7 @@ fn help_texts_have_80_columns_and_the_important_words() {
 
 #[test]
 fn wrong_command_lines_are_usage_errors() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     for (command, parts) in [
         ("", &["Usage"][..]),
         ("bop", &["Usage"]),
@@ -119,17 +119,16 @@ fn wrong_command_lines_are_usage_errors() {
         ("demo --noise -1", &["--noise", "'-1'", "0 to 50"]),
         ("demo --noise NaN", &["--noise", "NaN", "0 to 50"]),
     ] {
-        let words = command.split(' ').filter(|word| !word.is_empty());
-        let told = run(folder.path(), words).exits(2).complains(parts);
+        let told = folder.command(command).refuses(parts);
         assert_eq!(told.out, "", "{command}");
     }
-    assert!(crate::common::names(folder.path()).is_empty());
+    assert!(folder.names("").is_empty());
 }
 
 #[test]
 fn pipelines_are_listed_one_per_line() {
-    let folder = tempfile::tempdir().unwrap();
-    let listed = run(folder.path(), ["pipelines"]).exits(0).out;
+    let folder = Folder::new();
+    let listed = folder.command("pipelines").exits(0).out;
     let names: Vec<_> = listed
         .lines()
         .map(|l| l.split_whitespace().next().unwrap())
@@ -147,12 +146,8 @@ fn a_closed_pipe_is_not_an_error_and_the_work_is_done() {
     let scene = Scene::new()
         .without("--output")
         .with("--overlay", "overlay.png");
-    let refine: Vec<_> = scene
-        .arguments
-        .iter()
-        .flat_map(|(o, v)| [(*o).into(), v.clone()])
-        .collect();
-    let words = |text: &str| text.split(' ').map(Into::into).collect();
+    let words = |text: &'static str| text.split(' ').map(OsStr::new).collect();
+    let refine: Vec<_> = scene.words().collect();
     for (arguments, file) in [
         (words("demo"), Some("demo.png")),
         (words("pipelines"), None),
@@ -161,25 +156,14 @@ fn a_closed_pipe_is_not_an_error_and_the_work_is_done() {
     ] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
-        let mut child = program(scene.folder.path())
+        let mut program = program(scene.root());
+        program
             .args(&arguments)
             .stdout(writer)
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut err = String::new();
-        child
-            .stderr
-            .take()
-            .unwrap()
-            .read_to_string(&mut err)
-            .unwrap();
-        let status = child.wait().unwrap();
-        assert_eq!(
-            (status.code(), err.as_str()),
-            (Some(0), ""),
-            "{arguments:?}"
-        );
+            .stderr(Stdio::piped());
+        let ended = program.spawn().unwrap().wait_with_output().unwrap();
+        let run = Run::from(ended).exits(0);
+        assert_eq!(run.err, "", "{arguments:?}");
         assert!(file.is_none_or(|file| scene.path(file).is_file()));
     }
 }
@@ -187,16 +171,10 @@ fn a_closed_pipe_is_not_an_error_and_the_work_is_done() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_standard_output_is_an_error() {
-    let folder = tempfile::tempdir().unwrap();
-    let full = std::fs::OpenOptions::new()
-        .write(true)
-        .open("/dev/full")
-        .unwrap();
-    let output = program(folder.path())
-        .arg("pipelines")
-        .stdout(full)
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("standard output"));
+    let folder = Folder::new();
+    let full = std::fs::File::options().write(true).open("/dev/full");
+    let mut program = program(folder.root());
+    program.arg("pipelines").stdout(full.unwrap());
+    let run = Run::from(program.output().unwrap());
+    run.fails(&["standard output"]);
 }

@@ -2,11 +2,8 @@
 #![cfg(unix)]
 
 use std::os::unix::fs::symlink;
-use std::path::Path;
-use std::process::Command;
 
 use hicp_io::LengthUnit;
-
 use serde_json::json;
 
 use crate::common::*;
@@ -18,9 +15,8 @@ fn section<'a>(help: &'a str, heading: &str) -> Option<&'a str> {
 }
 
 /// Returns the help texts of a command and of its subcommands.
-fn help_texts(folder: &Path, command: &str) -> Vec<(String, String)> {
-    let words = command.split_whitespace().chain(["--help"]);
-    let help = run(folder, words).exits(0).out;
+fn help_texts(folder: &Folder, command: &str) -> Vec<(String, String)> {
+    let help = folder.command(format!("{command} --help")).exits(0).out;
     let list = section(&help, "\nCommands:\n").unwrap_or_default();
     let names = list.lines().filter_map(|line| line.strip_prefix("  "));
     // The other lines continue a description.
@@ -36,33 +32,30 @@ fn help_texts(folder: &Path, command: &str) -> Vec<(String, String)> {
 }
 
 /// Creates the dataset of the examples, with one scene of the number that they name.
-fn dataset(folder: &Path) {
+fn dataset(folder: &Folder) {
     let words = "bop generate --scenes 1 --images 2 --instances 3 --out bop/ycbv";
-    run(folder, words.split(' ')).exits(0);
-    let root = folder.join("bop/ycbv");
-    std::fs::rename(root.join("test/000001"), root.join("test/000050")).unwrap();
+    folder.command(words).exits(0);
+    let scenes = folder.path("bop/ycbv/test");
+    std::fs::rename(scenes.join("000001"), scenes.join("000050")).unwrap();
     // Without targets, every visible instance is one.
-    std::fs::remove_file(root.join("test_targets_bop19.json")).unwrap();
-    let rows = std::fs::read_to_string(root.join("initial_synthetic-test.csv")).unwrap();
-    std::fs::write(folder.join("rows.csv"), rows.replace("\n1,", "\n50,")).unwrap();
+    folder.remove("bop/ycbv/test_targets_bop19.json");
+    let rows = folder.read("bop/ycbv/initial_synthetic-test.csv");
+    folder.write("rows.csv", rows.replace("\n1,", "\n50,"));
     // A box in every image is a detection.
     let detection = |image: u32| {
         json!({"scene_id": 50, "image_id": image, "category_id": 1, "score": 0.5,
                "bbox": [200, 150, 240, 180]})
     };
     let detections = json!([detection(1), detection(2)]);
-    std::fs::write(folder.join("detections.json"), detections.to_string()).unwrap();
+    folder.write("detections.json", detections.to_string());
 }
 
 #[test]
 fn the_examples_of_all_help_texts_run() {
-    let shared = tempfile::tempdir().unwrap();
-    dataset(shared.path());
-    let program = Path::new(env!("CARGO_BIN_EXE_hybrid-icp"));
-    let program = program.parent().unwrap().display();
-    let path = format!("{program}:{}", std::env::var("PATH").unwrap());
+    let shared = Folder::new();
+    dataset(&shared);
     let mut n_examples = 0;
-    for (command, help) in help_texts(shared.path(), "") {
+    for (command, help) in help_texts(&shared, "") {
         let examples = section(&help, "\nExample:\n").or_else(|| section(&help, "\nExamples:\n"));
         let Some(examples) = examples else { continue };
         n_examples += 1;
@@ -70,20 +63,16 @@ fn the_examples_of_all_help_texts_run() {
         hicp_io::write_ply(scene.path("mug.ply"), &car(), LengthUnit::Millimeters).unwrap();
         std::fs::copy(scene.path("init.json"), scene.path("pose.json")).unwrap();
         hicp_io::write_rgb_png(scene.path("rgb.png"), 320, 240, &[90; 3 * 320 * 240]).unwrap();
-        write_clouds(scene.folder.path(), &truth());
+        write_clouds(&scene, &truth());
         for name in ["bop", "detections.json"] {
-            symlink(shared.path().join(name), scene.path(name)).unwrap();
+            symlink(shared.path(name), scene.path(name)).unwrap();
         }
         for name in ["in.csv", "cosypose_ycbv-test.csv", "refined_ycbv-test.csv"] {
-            std::fs::copy(shared.path().join("rows.csv"), scene.path(name)).unwrap();
+            std::fs::copy(shared.path("rows.csv"), scene.path(name)).unwrap();
         }
         // Fewer poses take less time.
         let script = examples.replace("--poses 30", "--poses 1");
-        let mut shell = Command::new("sh");
-        shell.args(["-e", "-c", &script]).env("PATH", &path);
-        let output = shell.current_dir(scene.folder.path()).output().unwrap();
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{command}: {script}\n{errors}");
+        run_script(scene.root(), &script, &command);
     }
     assert!(n_examples >= 9, "{n_examples}");
 }

@@ -8,16 +8,14 @@ const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 
     f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
 /// Returns the JSON report about a file.
-fn inspected(name: &str, content: impl AsRef<[u8]>, options: &[&str]) -> Value {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join(name), content).unwrap();
-    let run = run(
-        folder.path(),
-        [&["inspect", name, "--json"], options].concat(),
-    )
-    .exits(0);
+fn inspected(name: &str, content: impl AsRef<[u8]>, options: &str) -> Value {
+    let folder = Folder::new();
+    folder.write(name, content);
+    let run = folder
+        .command(format!("inspect {name} --json {options}"))
+        .exits(0);
     assert_eq!(run.err, "");
-    serde_json::from_str(&run.out).unwrap()
+    run.json()
 }
 
 #[track_caller]
@@ -35,7 +33,7 @@ fn warned(value: &Value, parts: &[&str]) {
 
 #[test]
 fn a_clean_mesh() {
-    let cube = inspected("cube.obj", CUBE, &[]);
+    let cube = inspected("cube.obj", CUBE, "");
     assert_eq!(cube["triangles"], 12);
     assert_eq!(cube["vertices"], 8);
     assert!((cube["diameter_m"].as_f64().unwrap() - 3.0_f64.sqrt()).abs() < 1e-9);
@@ -51,47 +49,38 @@ fn a_clean_mesh() {
     warned(&cube, &[]);
     let textured = "mtllib gone.mtl\nusemtl red\n".to_owned() + CUBE;
     warned(
-        &inspected("cube.obj", textured, &[]),
+        &inspected("cube.obj", textured, ""),
         &["colors cannot be used: "],
     );
-    let folder = tempfile::tempdir().unwrap();
-    hicp_io::write_ply(
-        folder.path().join("car.ply"),
-        &car(),
-        LengthUnit::Millimeters,
-    )
-    .unwrap();
-    let told = run(folder.path(), ["inspect", "car.ply", "--unit", "mm"]).exits(0);
-    assert!(
-        told.out.contains("car.ply") && told.out.contains("diameter 0."),
-        "{}",
-        told.out
-    );
+    let folder = Folder::new();
+    hicp_io::write_ply(folder.path("car.ply"), &car(), LengthUnit::Millimeters).unwrap();
+    let told = folder.command("inspect car.ply --unit mm").exits(0);
+    told.prints(&["car.ply", "diameter 0."]);
 }
 
 #[test]
 fn flaws_are_warned_of() {
-    let small = inspected("cube.obj", CUBE, &["--unit", "mm"]);
+    let small = inspected("cube.obj", CUBE, "--unit mm");
     warned(
         &small,
         &["the diameter with --unit mm is 1.7321e-3 m, expected 0.005 to 5 m; in m"],
     );
     assert_eq!(small["suspected_unit"], "m");
-    let large = inspected("cube.obj", CUBE, &["--unit", "cm", "--max-rows", "1"]);
+    let large = inspected("cube.obj", CUBE, "--unit cm --max-rows 1");
     assert_eq!(large["suspected_unit"], Value::Null);
     assert_eq!(large["unit"], "cm");
     let open = CUBE.replace("f 4 3 2 1\n", "");
-    let open = inspected("cube.obj", open, &[]);
+    let open = inspected("cube.obj", open, "");
     assert_eq!(open["closed"], false);
     warned(
         &open,
         &["the surface is open: edges with only one triangle: 4"],
     );
-    let turned = inspected("cube.obj", CUBE.replace("f 4 3 2 1", "f 1 2 3 4"), &[]);
+    let turned = inspected("cube.obj", CUBE.replace("f 4 3 2 1", "f 1 2 3 4"), "");
     assert_eq!(turned["closed"], true);
     assert_eq!(turned["facing"], "unknown");
     warned(&turned, &["edges whose triangles have opposite winding: 4"]);
-    let twice = inspected("cube.obj", format!("{CUBE}f 5 6 7\n"), &[]);
+    let twice = inspected("cube.obj", format!("{CUBE}f 5 6 7\n"), "");
     warned(
         &twice,
         &[
@@ -99,53 +88,46 @@ fn flaws_are_warned_of() {
             "duplicate triangles: 1",
         ],
     );
-    let flat = inspected("cube.obj", format!("{CUBE}f 1 1 2\n"), &[]);
+    let flat = inspected("cube.obj", format!("{CUBE}f 1 1 2\n"), "");
     warned(&flat, &["triangles without area: 1"]);
     let off = "OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n7 7 7\n3 0 1 2\n";
     warned(
-        &inspected("a.off", off, &[]),
+        &inspected("a.off", off, ""),
         &["only one triangle: 3", "vertices without a triangle: 1"],
     );
     let far = "v 500000 4582345.26 0\nv 500001 4582345 0\nv 500000 4582346 0\nf 1 2 3\n";
     warned(
-        &inspected("a.obj", far, &[]),
+        &inspected("a.obj", far, ""),
         &["steps of 5.0e-1 m", "only one triangle: 3"],
     );
 }
 
 #[test]
 fn files_that_cannot_be_read_are_errors_and_limits_can_be_raised() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-    let inspect =
-        |options: &[&str]| run(folder.path(), [&["inspect", "cube.obj"], options].concat());
-    inspect(&["--max-triangles", "11"]).exits(1).complains(&[
+    let folder = Folder::new();
+    folder.write("cube.obj", CUBE);
+    let inspect = |options: &str| folder.command(format!("inspect cube.obj {options}"));
+    inspect("--max-triangles 11").fails(&[
         "cube.obj, line 14",
         "found 12 triangles, expected at most 11",
         "--max-triangles",
     ]);
-    inspect(&["--max-triangles", "12", "--max-vertices", "8"]).exits(0);
-    inspect(&["--max-file-bytes", "9"])
-        .exits(1)
-        .complains(&["expected at most 9", "--max-file-bytes"]);
-    run(folder.path(), ["inspect", "no.stl"])
-        .exits(1)
-        .complains(&["cannot read no.stl"]);
-    run(folder.path(), ["inspect", "."])
-        .exits(1)
-        .complains(&["extension"]);
-    run(folder.path(), ["inspect", "cube.obj", "--unit", "inch"]).exits(2);
+    inspect("--max-triangles 12 --max-vertices 8").exits(0);
+    inspect("--max-file-bytes 9").fails(&["expected at most 9", "--max-file-bytes"]);
+    folder
+        .command("inspect no.stl")
+        .fails(&["cannot read no.stl"]);
+    folder.command("inspect .").fails(&["extension"]);
+    folder.command("inspect cube.obj --unit inch").exits(2);
     let scene = Scene::new().with("--max-small-json-bytes", "9");
     scene
         .run()
-        .exits(1)
-        .complains(&["camera.json", "at most 9", "--max-small-json-bytes"]);
+        .fails(&["camera.json", "at most 9", "--max-small-json-bytes"]);
     // A limit applies wherever the option is on the command line.
     let scene = Scene::new().with("--max-pixels", "1000");
     scene
         .run()
-        .exits(1)
-        .complains(&["depth.png", "320x240", "at most 1000", "--max-pixels"]);
+        .fails(&["depth.png", "320x240", "at most 1000", "--max-pixels"]);
 }
 
 #[test]
@@ -172,7 +154,7 @@ fn awkward_files_have_the_verdicts_of_a_reference_reader() {
                     !expected.starts_with("clean-error ") && expected != "clean-error",
                     "{file}"
                 );
-                let value: Value = serde_json::from_str(&told.out).unwrap();
+                let value = told.json();
                 assert_eq!(value["triangles"], entry["trimesh_triangles"], "{file}");
                 read += 1;
                 if value["closed"] != entry["watertight"] {
@@ -189,12 +171,9 @@ fn awkward_files_have_the_verdicts_of_a_reference_reader() {
                     "{file}: {}",
                     told.err
                 );
-                assert!(
-                    told.err.contains(file)
-                        && (told.err.contains(", line ") || told.err.contains(", byte ")),
-                    "{}",
-                    told.err
-                );
+                assert_contains(&told.err, &[file]);
+                let has_place = [", line ", ", byte "].iter().any(|p| told.err.contains(p));
+                assert!(has_place, "{}", told.err);
             }
         }
     }

@@ -1,17 +1,17 @@
 //! `hybrid-icp objects`.
 
-use crate::common::{names, run};
+use crate::common::*;
 use hicp_io::{LengthUnit, read_mesh};
 use hicp_sim::Household;
 
 #[test]
 fn it_writes_every_object_a_sheet_and_a_table() {
-    let folder = tempfile::tempdir().unwrap();
-    let shown = run(folder.path(), ["objects", "--out", "a/b"]).exits(0);
-    assert!(shown.out.contains("20 meshes"), "{}", shown.out);
-    let written = folder.path().join("a/b");
-    assert_eq!(names(&written).len(), 22);
-    let table = std::fs::read_to_string(written.join("objects.csv")).unwrap();
+    let folder = Folder::new();
+    let shown = folder.command("objects --out a/b").exits(0);
+    shown.prints(&["20 meshes"]);
+    let written = folder.path("a/b");
+    assert_eq!(folder.names("a/b").len(), 22);
+    let table = folder.read("a/b/objects.csv");
     assert_eq!(table.lines().count(), 21);
     for object in Household::ALL {
         let name = object.name();
@@ -26,10 +26,7 @@ fn it_writes_every_object_a_sheet_and_a_table() {
         } else {
             "tuning"
         };
-        assert!(
-            table.contains(&format!(",{name},{set},{name}.ply,")),
-            "{table}"
-        );
+        assert_contains(&table, &[&format!(",{name},{set},{name}.ply,")]);
     }
     // Every cell has a drawing.
     let sheet = hicp_io::read_color(written.join("contact_sheet.png")).unwrap();
@@ -49,8 +46,8 @@ fn it_writes_every_object_a_sheet_and_a_table() {
 
 #[test]
 fn a_folder_that_cannot_be_created_is_reported() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("file"), "").unwrap();
-    let told = run(folder.path(), ["objects", "--out", "file/below"]).exits(1);
+    let folder = Folder::new();
+    folder.write("file", "");
+    let told = folder.command("objects --out file/below").exits(1);
     told.complains(&["cannot create the folder file/below"]);
 }

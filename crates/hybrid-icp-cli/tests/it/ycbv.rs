@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use crate::common::run;
+use crate::common::*;
 use hicp_bop::ModelFolder;
 use hicp_io::bop::{Dataset, read_results};
 use hicp_sim::{RelativeGaussian, rng};
@@ -36,15 +36,14 @@ fn root() -> Option<PathBuf> {
 #[test]
 fn a_rough_pose_is_no_fault_of_the_depth_image() {
     let Some(root) = root() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-    write(
+    let folder = Folder::new();
+    folder.write(
         "camera.json",
         r#"{"cam_K": [1066.778, 0, 312.9869, 0, 1067.487, 241.3109, 0, 0, 1], "depth_scale": 0.1}"#,
     );
     let pose = r#"{"cam_R_m2c": [0.672873, -0.739703, 0.00905, -0.302544, -0.286333, -0.90911,
         0.675062, 0.608978, -0.416458], "cam_t_m2c": [-98.3928, 125.3708, 829.6257]}"#;
-    write("init.json", pose);
+    folder.write("init.json", pose);
     let scene = root.join("test/000050");
     let files = [
         ("--model", root.join("models/obj_000010.ply")),
@@ -59,7 +58,7 @@ fn a_rough_pose_is_no_fault_of_the_depth_image() {
             .iter()
             .flat_map(|(option, path)| [OsStr::new(*option), path.as_os_str()]),
     );
-    let told = run(folder.path(), words).exits(0).out;
+    let told = run(folder.root(), words).exits(0).out;
     assert!(told.starts_with("no fault found"), "{told}");
 }
 
@@ -83,7 +82,7 @@ fn the_papers_method_moves_most_real_estimates() {
 /// Returns the number of moved poses and of all poses for each.
 fn improves(root: &Path, options: &[&str]) -> Vec<(usize, usize)> {
     let mut all_moved = Vec::new();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let mut files = 0;
     for entry in std::fs::read_dir(root.join("results")).unwrap() {
         let results = entry.unwrap().path();
@@ -106,7 +105,7 @@ fn improves(root: &Path, options: &[&str]) -> Vec<(usize, usize)> {
                 OsStr::new(threads),
             ];
             arguments.extend(options.iter().map(OsStr::new));
-            let done = run(folder.path(), arguments).exits(0);
+            let done = run(folder.root(), arguments).exits(0);
             // Some real estimates give warnings, but the dataset gives none.
             let of_poses = |line: &str| line.starts_with("warning: out.csv: ");
             assert!(done.err.lines().all(of_poses), "{}", done.err);
@@ -116,12 +115,12 @@ fn improves(root: &Path, options: &[&str]) -> Vec<(usize, usize)> {
                 .filter_map(|w| w.parse().ok())
                 .collect();
             assert!(medians.len() == 2 && medians[1] < medians[0], "{line}");
-            bytes.push(std::fs::read(folder.path().join("out.csv")).unwrap());
+            bytes.push(folder.bytes("out.csv"));
         }
         assert_eq!(bytes[0], bytes[1]);
         let (before, after) = (
             read_results(&results).unwrap(),
-            read_results(folder.path().join("out.csv")).unwrap(),
+            read_results(folder.path("out.csv")).unwrap(),
         );
         assert_eq!(before.len(), after.len());
         let mut moved = 0;
@@ -226,7 +225,7 @@ fn results_in_the_mask_of_something_else_have_a_low_confidence() {
 #[test]
 fn one_real_instance_is_refined_from_its_files() {
     let Some(root) = root() else { return };
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let dataset = Dataset::open(&root).unwrap();
     let scene = dataset.scene("test", 51).unwrap();
     let truth = scene.ground_truth(1).unwrap()[1];
@@ -235,7 +234,7 @@ fn one_real_instance_is_refined_from_its_files() {
         .iter()
         .find(|row| (row.scene_id, row.im_id, row.obj_id) == (51, 1, truth.obj_id))
         .unwrap();
-    let init = folder.path().join("init.json");
+    let init = folder.path("init.json");
     hicp_io::write_pose_json(&init, &row.camera_from_object()).unwrap();
     // A `scene_camera.json` with one image is a valid camera file.
     let (model, depth) = (
@@ -263,7 +262,7 @@ fn one_real_instance_is_refined_from_its_files() {
         OsStr::new("--overlay"),
         OsStr::new("overlay.png"),
     ];
-    let done = run(folder.path(), arguments).exits(0);
+    let done = run(folder.root(), arguments).exits(0);
     // Depth does not tell the two sides of the box apart.
     let (_, warning) = done.err.split_once("warning: ambiguous: 2 poses").unwrap();
     let apart = warning.split_once("° apart").map(|(text, _)| text);
@@ -275,5 +274,5 @@ fn one_real_instance_is_refined_from_its_files() {
         (pose.translation.vector - truth.camera_from_object.translation.vector).norm()
     };
     assert!(error(&crate::common::pose_of(&result)) < 0.5 * error(&row.camera_from_object()));
-    assert!(folder.path().join("overlay.png").is_file());
+    assert!(folder.path("overlay.png").is_file());
 }

@@ -12,8 +12,8 @@ use crate::common::*;
 
 /// Runs a command of `hybrid-icp bop`, asserts success without warnings, and returns its output.
 #[track_caller]
-fn bop(folder: &Path, words: &str) -> String {
-    let told = run(folder, std::iter::once("bop").chain(words.split(' '))).exits(0);
+fn bop(folder: &Folder, words: &str) -> String {
+    let told = folder.command(format!("bop {words}")).exits(0);
     assert_eq!(told.err, "", "bop {words}");
     told.out
 }
@@ -32,38 +32,35 @@ fn without_times(markdown: &str) -> String {
 
 #[test]
 fn generate_refine_eval_compare_show() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = Folder::new();
     let initial = "set/initial_synthetic-test.csv";
     let generate = "generate --scenes 1 --images 2 --instances 6 --seed 5 --out set";
-    let mut found = format!("$ bop {generate}\n{}", bop(folder, generate));
+    let mut found = format!("$ bop {generate}\n{}", bop(&folder, generate));
 
     let refine = format!("refine --dataset set --no-time --results {initial} --output refined.csv");
-    let told = bop(folder, &refine);
+    let told = bop(&folder, &refine);
     let (_, summary) = told.split_once('\n').unwrap();
     let _ = write!(found, "\n$ bop {refine}\n{summary}");
 
     for results in ["set/truth_synthetic-test.csv", initial, "refined.csv"] {
         let eval = format!("eval --dataset set --results {results}");
-        let _ = write!(found, "\n$ bop {eval}\n{}", bop(folder, &eval));
+        let _ = write!(found, "\n$ bop {eval}\n{}", bop(&folder, &eval));
     }
 
     let pipelines = "hybrid,projective-cascade-point-plane";
     let compare =
         format!("compare --dataset set --results {initial} --pipelines {pipelines} --out compared");
     // One of the pipelines fails for some rows, so there are warnings.
-    let words = compare.split(' ');
-    let told = run(folder, std::iter::once("bop").chain(words)).exits(0);
-    let markdown = std::fs::read_to_string(folder.join("compared/compare.md")).unwrap();
-    let table = without_times(&markdown);
+    let told = folder.command(format!("bop {compare}")).exits(0);
+    let table = without_times(&folder.read("compared/compare.md"));
     let _ = write!(found, "\n$ bop {compare}\n{}\n{table}", told.err);
-    assert!(folder.join("compared/compare.html").is_file());
+    assert!(folder.path("compared/compare.html").is_file());
 
     let show = format!(
         "show --dataset set --scene 1 --image 1 --results refined.csv --against {initial} --out show.png"
     );
-    let _ = write!(found, "\n$ bop {show}\n{}", bop(folder, &show));
-    let (width, height) = hicp_io::read_png_size(folder.join("show.png")).unwrap();
+    let _ = write!(found, "\n$ bop {show}\n{}", bop(&folder, &show));
+    let (width, height) = hicp_io::read_png_size(folder.path("show.png")).unwrap();
     let _ = writeln!(found, "{width}x{height}");
 
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/bop_chain.txt");

@@ -1,7 +1,5 @@
 //! `hybrid-icp bop compare` on a generated dataset.
 
-use std::path::Path;
-
 use crate::common::*;
 use serde_json::Value;
 
@@ -9,8 +7,8 @@ const COMPARE: &str =
     "bop compare --dataset set --init set/initial_synthetic-test.csv --out compared";
 
 /// Returns the cells of the first table without its head.
-fn cells(folder: &Path) -> Vec<Vec<String>> {
-    let text = std::fs::read_to_string(folder.join("compared/compare.md")).unwrap();
+fn cells(folder: &Folder) -> Vec<Vec<String>> {
+    let text = folder.read("compared/compare.md");
     let lines = text
         .lines()
         .skip(2)
@@ -26,21 +24,20 @@ fn cells(folder: &Path) -> Vec<Vec<String>> {
 
 #[test]
 fn pipelines_are_compared_by_the_numbers_of_eval() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = Folder::new();
     let words = "bop generate --scenes 1 --images 2 --instances 5 --out set";
-    run(folder, words.split(' ')).exits(0);
+    folder.command(words).exits(0);
     // The page names files without their folders.
     let (dataset, init) = (
-        folder.join("set"),
-        folder.join("set/initial_synthetic-test.csv"),
+        folder.path("set"),
+        folder.path("set/initial_synthetic-test.csv"),
     );
     let words = format!(
         "bop compare --dataset {} --init {} --out compared --pipelines hybrid,nn-point-to-point",
         dataset.display(),
         init.display()
     );
-    let told = run(folder, words.split(' ')).exits(0);
+    let told = folder.command(words).exits(0);
     // Warnings about poses name the file of their pipeline.
     let begin = "warning: compared/nn-point-to-point.csv: ";
     assert!(
@@ -49,7 +46,7 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
         told.err
     );
     assert_eq!(
-        names(&folder.join("compared")),
+        folder.names("compared"),
         [
             "compare.html",
             "compare.json",
@@ -63,15 +60,14 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
             "ray-shift.json"
         ]
     );
-    let cells = cells(folder);
+    let cells = cells(&folder);
     let named: Vec<&str> = cells.iter().map(|line| line[0].as_str()).collect();
     assert_eq!(
         named,
         ["initial", "ray-shift", "hybrid", "nn-point-to-point"]
     );
     for line in &cells {
-        let path = folder.join(format!("compared/{}.json", line[0]));
-        let report: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+        let report = folder.json(format!("compared/{}.json", line[0]));
         let keys = ["ar", "ar_vsd", "ar_mssd", "ar_mspd"];
         for (key, cell) in keys.iter().zip(&line[1..]) {
             assert_eq!(&format!("{:.3}", report[key].as_f64().unwrap()), cell);
@@ -109,10 +105,10 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
         let ratio = number(line, 8) / number(2, 8);
         assert!((number(line, 9) - ratio).abs() < 0.01 + 0.01 * ratio);
     }
-    let read = |name: &str| std::fs::read_to_string(folder.join("compared").join(name)).unwrap();
-    let document: Value = serde_json::from_str(&read("compare.json")).unwrap();
+    let read = |name: &str| folder.read(format!("compared/{name}"));
+    let document = folder.json("compared/compare.json");
     for (entry, line) in document["entries"].as_array().unwrap().iter().zip(&cells) {
-        let report: Value = serde_json::from_str(&read(&format!("{}.json", line[0]))).unwrap();
+        let report = folder.json(format!("compared/{}.json", line[0]));
         assert_eq!(entry["name"].as_str().unwrap(), line[0]);
         for key in [
             "ar",
@@ -149,7 +145,7 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
         page.contains(&format!("<td><b>{least}</b></td>")),
         "{least}"
     );
-    let path = folder.to_str().unwrap();
+    let path = folder.root().to_str().unwrap();
     for name in ["compare.html", "compare.md"] {
         let text = read(name);
         assert!(text.contains("initial_synthetic-test.csv in set, split test: "));
@@ -169,44 +165,37 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
     let first = r#"[{"scene_id": 1, "im_id": 0, "obj_id": OBJ, "inst_count": 1},
                     {"scene_id": 1, "im_id": 99, "obj_id": OBJ, "inst_count": 1}]"#;
     let id = objects.keys().next().unwrap();
-    std::fs::write(folder.join(targets), first.replace("OBJ", id)).unwrap();
+    folder.write(targets, first.replace("OBJ", id));
     let options = "--mask none --no-color --models models --targets targets.json";
     let words = format!(
         "bop compare --dataset set --results set/initial_synthetic-test.csv --pipelines hybrid --out boxes {options}"
     );
-    let told = run(folder, words.split(' ')).exits(0);
-    assert!(
-        told.out
-            .contains("\n1 targets could not be evaluated and are left out\n")
-    );
-    let path = folder.join("boxes/compare.json");
-    let boxes: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    let told = folder.command(words).exits(0);
+    let left_out = "\n1 targets could not be evaluated and are left out\n";
+    told.prints(&[left_out]);
+    let boxes = folder.json("boxes/compare.json");
     assert!(rows > Some(1) && boxes["entries"][0]["targets"] == 1);
     assert_eq!(boxes["entries"][2]["ar_interval"], Value::Null);
-    let text = std::fs::read_to_string(folder.join("boxes/compare.md")).unwrap();
-    assert!(
-        text.contains("split test, without masks: 1 targets"),
-        "{text}"
-    );
+    let text = folder.read("boxes/compare.md");
+    assert_contains(&text, &["split test, without masks: 1 targets"]);
 
     // `bop refine` alone writes the same poses.
     let words = "bop refine --dataset set --results set/initial_synthetic-test.csv --pipeline hybrid --output alone.csv";
-    run(folder, words.split(' ')).exits(0);
+    folder.command(words).exits(0);
     let poses = |name: &str| -> Vec<_> {
-        let rows = hicp_io::bop::read_results(folder.join(name)).unwrap();
+        let rows = hicp_io::bop::read_results(folder.path(name)).unwrap();
         rows.iter().map(|row| row.camera_from_object()).collect()
     };
     assert_eq!(poses("alone.csv"), poses("compared/hybrid.csv"));
     let words = format!("{words} --mask none");
-    run(folder, words.split(' ')).exits(0);
+    folder.command(words).exits(0);
     assert_eq!(poses("alone.csv"), poses("boxes/hybrid.csv"));
 }
 
 #[test]
 fn wrong_pipelines_are_reported_before_anything_is_computed() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    std::fs::write(folder.join("hybrid.toml"), "").unwrap();
+    let folder = Folder::new();
+    folder.write("hybrid.toml", "");
     for (pipelines, code, parts) in [
         (
             "hybird",
@@ -220,28 +209,25 @@ fn wrong_pipelines_are_reported_before_anything_is_computed() {
         ("hybrid,gone.toml", 1, &["gone.toml"]),
     ] {
         let words = format!("{COMPARE} --pipelines {pipelines}");
-        run(folder, words.split(' ')).exits(code).complains(parts);
-        assert_eq!(names(folder), ["hybrid.toml"]);
+        folder.command(words).exits(code).complains(parts);
+        assert_eq!(folder.names(""), ["hybrid.toml"]);
     }
     let words = format!("{COMPARE} --pipelines hybrid");
-    run(folder, words.split(' '))
-        .exits(1)
-        .complains(&["initial_synthetic-test.csv"]);
+    folder.command(words).fails(&["initial_synthetic-test.csv"]);
 }
 
 #[test]
 fn no_input_is_overwritten() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = Folder::new();
     let words = "bop generate --scenes 1 --images 1 --instances 2 --out set";
-    run(folder, words.split(' ')).exits(0);
-    let init = std::fs::read(folder.join("set/initial_synthetic-test.csv")).unwrap();
-    let pipeline = run(folder, ["pipelines", "--show", "hybrid"]).out;
-    std::fs::create_dir(folder.join("out")).unwrap();
+    folder.command(words).exits(0);
+    let init = folder.bytes("set/initial_synthetic-test.csv");
+    let pipeline = folder.command("pipelines --show hybrid").out;
+    folder.create_dir("out");
     for name in ["hybrid.csv", "hybrid.csv.journal"] {
-        std::fs::write(folder.join("out").join(name), &init).unwrap();
+        folder.write(format!("out/{name}"), &init);
     }
-    std::fs::write(folder.join("test_targets_bop19.toml"), &pipeline).unwrap();
+    folder.write("test_targets_bop19.toml", &pipeline);
     for (init, pipelines, out, parts) in [
         (
             "out/hybrid.csv",
@@ -267,14 +253,11 @@ fn no_input_is_overwritten() {
     ] {
         let words =
             format!("bop compare --dataset set --init {init} --pipelines {pipelines} --out {out}");
-        let told = run(folder, words.split(' ')).exits(1);
+        let told = folder.command(words).exits(1);
         assert_eq!(told.complains(parts).out, "");
-        assert_eq!(
-            names(&folder.join("out")),
-            ["hybrid.csv", "hybrid.csv.journal"]
-        );
+        assert_eq!(folder.names("out"), ["hybrid.csv", "hybrid.csv.journal"]);
     }
     for name in ["hybrid.csv", "hybrid.csv.journal"] {
-        assert_eq!(std::fs::read(folder.join("out").join(name)).unwrap(), init);
+        assert_eq!(folder.bytes(format!("out/{name}")), init);
     }
 }

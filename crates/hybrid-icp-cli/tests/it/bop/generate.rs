@@ -1,7 +1,7 @@
 //! `hybrid-icp bop generate`, and the refinement and evaluation of its datasets.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::common::*;
 use hicp_io::bop::{Dataset, read_results};
@@ -10,48 +10,29 @@ use serde_json::Value;
 const SMALL: &str = "bop generate --scenes 2 --images 2 --instances 5 --seed 11";
 
 #[track_caller]
-fn generate(folder: &Path, options: &str) -> Run {
-    let run = run(folder, SMALL.split(' ').chain(options.split(' '))).exits(0);
+fn generate(folder: &Folder, options: &str) -> Run {
+    let run = folder.command(format!("{SMALL} {options}")).exits(0);
     assert_eq!(run.err, "");
     run
 }
 
-/// Returns all files below a folder with their contents.
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(next) = folders.pop() {
-        for name in names(&next) {
-            let path = next.join(name);
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path.strip_prefix(folder).unwrap().to_owned();
-                found.insert(name, std::fs::read(path).unwrap());
-            }
-        }
-    }
-    found
-}
-
 /// Evaluates, asserts that there is no warning, and returns the report.
 #[track_caller]
-fn eval(folder: &Path, results: &str) -> Value {
+fn eval(folder: &Folder, results: &str) -> Value {
     let words = format!("bop eval --dataset set --results {results} --json report.json");
-    let run = run(folder, words.split(' ')).exits(0);
+    let run = folder.command(words).exits(0);
     assert_eq!(run.err, "");
-    serde_json::from_slice(&std::fs::read(folder.join("report.json")).unwrap()).unwrap()
+    folder.json("report.json")
 }
 
 #[test]
 fn generated_refined_evaluated() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let told = generate(folder, "--out set --starts 2");
-    assert!(told.out.contains("4 images of 2 scenes"), "{}", told.out);
+    let folder = Folder::new();
+    let told = generate(&folder, "--out set --starts 2");
+    told.prints(&["4 images of 2 scenes"]);
     let initial = "set/initial_synthetic-test.csv";
     let words = format!("bop refine --dataset set --results {initial} --output out.csv");
-    let run = run(folder, words.split(' ')).exits(0);
+    let run = folder.command(words).exits(0);
     // The initial pose of a mostly hidden object may explain nothing.
     let elsewhere = "rows the initial pose explained nothing of the mask";
     assert!(
@@ -65,23 +46,23 @@ fn generated_refined_evaluated() {
         run.out
     );
 
-    let truth = eval(folder, "set/truth_synthetic-test.csv");
+    let truth = eval(&folder, "set/truth_synthetic-test.csv");
     for recall in ["ar", "ar_vsd", "ar_mssd", "ar_mspd", "ad_recall"] {
         assert_eq!(truth[recall], 1.0, "{recall}");
     }
     assert_eq!(truth["missing"], 0);
     // Of two estimates of an instance, only one is evaluated.
-    let rows = read_results(folder.join(initial)).unwrap();
-    let alone = read_results(folder.join("set/truth_synthetic-test.csv")).unwrap();
+    let rows = read_results(folder.path(initial)).unwrap();
+    let alone = read_results(folder.path("set/truth_synthetic-test.csv")).unwrap();
     assert_eq!(rows.len(), 2 * alone.len());
     assert_eq!(truth["targets"].as_u64().unwrap(), alone.len() as u64);
     // With one start each, every instance has one estimate, and no row is beyond the targets.
     let one_each = |name: &str, from: &str| {
-        let mut rows = read_results(folder.join(from)).unwrap();
+        let mut rows = read_results(folder.path(from)).unwrap();
         rows.retain(|row| row.score == 1.0);
         assert_eq!(rows.len(), alone.len());
-        hicp_io::bop::write_results(folder.join(name), &rows).unwrap();
-        eval(folder, name)
+        hicp_io::bop::write_results(folder.path(name), &rows).unwrap();
+        eval(&folder, name)
     };
     let before = one_each("before.csv", initial);
     let after = one_each("after.csv", "out.csv");
@@ -94,11 +75,8 @@ fn generated_refined_evaluated() {
     }
     // Both starts of each instance give the recalls of the first ones.
     let words = "bop eval --dataset set --results out.csv --json report.json";
-    self::run(folder, words.split(' '))
-        .exits(0)
-        .complains(&["the last of equal ones"]);
-    let both = std::fs::read(folder.join("report.json")).unwrap();
-    let both: Value = serde_json::from_slice(&both).unwrap();
+    folder.command(words).warns(&["the last of equal ones"]);
+    let both = folder.json("report.json");
     assert_eq!(both["ar"], after["ar"]);
     let adi = |report: &Value| report["median_adi_mm"].as_f64().unwrap();
     assert!(
@@ -111,12 +89,11 @@ fn generated_refined_evaluated() {
 
 #[test]
 fn symmetric_equivalents_of_the_truth_score_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    generate(folder, "--out set");
-    let infos = Dataset::open(folder.join("set")).unwrap();
+    let folder = Folder::new();
+    generate(&folder, "--out set");
+    let infos = Dataset::open(folder.path("set")).unwrap();
     let infos = infos.read_models_info().unwrap();
-    let mut rows = read_results(folder.join("set/truth_synthetic-test.csv")).unwrap();
+    let mut rows = read_results(folder.path("set/truth_synthetic-test.csv")).unwrap();
     let (mut turned, mut flipped) = (0, 0);
     for row in &mut rows {
         let symmetries = &infos[&row.obj_id].symmetries;
@@ -133,8 +110,8 @@ fn symmetric_equivalents_of_the_truth_score_one() {
         row.set_camera_from_object(pose);
     }
     assert!(turned > 0 && flipped > 0, "{turned} {flipped}");
-    hicp_io::bop::write_results(folder.join("turned.csv"), &rows).unwrap();
-    let report = eval(folder, "turned.csv");
+    hicp_io::bop::write_results(folder.path("turned.csv"), &rows).unwrap();
+    let report = eval(&folder, "turned.csv");
     assert_eq!(report["ar_mssd"], 1.0);
     assert_eq!(report["ar_mspd"], 1.0);
     assert_eq!(report["ad_recall"], 1.0);
@@ -143,24 +120,23 @@ fn symmetric_equivalents_of_the_truth_score_one() {
     assert!(report["ar_vsd"].as_f64().unwrap() >= 0.989);
 
     // Without declared symmetries, the same poses are wrong.
-    let path = folder.join("set/models/models_info.json");
-    let mut declared: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
-    for info in declared.as_object_mut().unwrap().values_mut() {
-        let info = info.as_object_mut().unwrap();
-        info.retain(|key, _| !key.starts_with("symmetries"));
-    }
-    std::fs::write(&path, declared.to_string()).unwrap();
-    let report = eval(folder, "turned.csv");
+    folder.change_json("set/models/models_info.json", |declared| {
+        for info in declared.as_object_mut().unwrap().values_mut() {
+            let info = info.as_object_mut().unwrap();
+            info.retain(|key, _| !key.starts_with("symmetries"));
+        }
+    });
+    let report = eval(&folder, "turned.csv");
     assert!(report["ar_mssd"].as_f64().unwrap() < 1.0);
 }
 
 #[test]
 fn the_layout_is_that_of_the_benchmark() {
-    let folder = tempfile::tempdir().unwrap();
-    generate(folder.path(), "--out set");
-    let set = folder.path().join("set");
+    let folder = Folder::new();
+    generate(&folder, "--out set");
+    let set = folder.path("set");
     assert_eq!(
-        names(&set),
+        folder.names("set"),
         [
             "camera.json",
             "initial_synthetic-test.csv",
@@ -229,25 +205,24 @@ fn the_layout_is_that_of_the_benchmark() {
 
 #[test]
 fn the_same_options_give_the_same_bytes_on_any_number_of_threads() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    generate(folder, "--out a --threads 1");
-    generate(folder, "--out b --threads 3");
-    let files_of_a = files(&folder.join("a"));
+    let folder = Folder::new();
+    generate(&folder, "--out a --threads 1");
+    generate(&folder, "--out b --threads 3");
+    let files_of_a = folder.files("a");
     // 4 images have a depth image and 2 x 5 masks each. 2 scenes have 3 files each. There are 20
     // models with their info, and 4 other files.
     assert_eq!(files_of_a.len(), 4 * 11 + 6 + 21 + 4);
-    assert!(files_of_a == files(&folder.join("b")));
+    assert!(files_of_a == folder.files("b"));
     let other = SMALL.replace("11", "12") + " --out c";
-    run(folder, other.split(' ')).exits(0);
+    folder.command(other).exits(0);
     let depth = Path::new("test/000001/depth/000000.png");
-    assert_ne!(files(&folder.join("c"))[depth], files_of_a[depth]);
+    assert_ne!(folder.files("c")[depth], files_of_a[depth]);
 
     // The models of the dataset give the same scenes: ids, sizes and symmetries come from the
     // files.
-    generate(folder, "--out d --objects a/models");
+    generate(&folder, "--out d --objects a/models");
     let read = |set: &str| {
-        Dataset::open(folder.join(set))
+        Dataset::open(folder.path(set))
             .unwrap()
             .read_models_info()
             .unwrap()
@@ -268,27 +243,26 @@ fn the_same_options_give_the_same_bytes_on_any_number_of_threads() {
         assert_eq!(count(info), count(&theirs[id]));
     }
     // Meshes may have any name; these are in meters.
-    run(folder, ["objects", "--out", "meshes"]).exits(0);
-    generate(folder, "--out e --objects meshes");
+    folder.command("objects --out meshes").exits(0);
+    generate(&folder, "--out e --objects meshes");
     assert_eq!(read("e").len(), 20);
 }
 
 #[test]
 fn impossible_options_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = Folder::new();
     let fails = |options: &str, code: i32, parts: &[&str]| {
         let words = format!("bop generate {options}");
-        run(folder, words.split(' ')).exits(code).complains(parts);
+        folder.command(words).exits(code).complains(parts);
     };
-    std::fs::create_dir(folder.join("full")).unwrap();
-    std::fs::write(folder.join("full/mine.txt"), "the user's").unwrap();
+    folder.create_dir("full");
+    folder.write("full/mine.txt", "the user's");
     fails(
         "--scenes 1 --out full",
         1,
         &["--out full has 1 entries", "new or empty folder"],
     );
-    assert_eq!(names(&folder.join("full")), ["mine.txt"]);
+    assert_eq!(folder.names("full"), ["mine.txt"]);
     fails(
         "--scenes 1 --out new --objects full",
         1,
@@ -300,7 +274,7 @@ fn impossible_options_are_refused() {
         &["cannot list --objects gone"],
     );
     hicp_io::write_ply(
-        folder.join("full/car.ply"),
+        folder.path("full/car.ply"),
         &car(),
         hicp_io::LengthUnit::Millimeters,
     )
@@ -310,7 +284,7 @@ fn impossible_options_are_refused() {
         1,
         &["object 1 has a diameter of", "--objects-unit"],
     );
-    std::fs::write(folder.join("full/car.ply"), "ply\n").unwrap();
+    folder.write("full/car.ply", "ply\n");
     fails("--scenes 1 --out new --objects full", 1, &["car.ply"]);
     fails("--scenes 0 --out new", 2, &["--scenes", "'0'", "1.."]);
     fails(
@@ -339,5 +313,5 @@ fn impossible_options_are_refused() {
         &["--objects-unit", "inch", "m, mm or cm"],
     );
     fails("--out new", 2, &["--scenes"]);
-    assert_eq!(names(folder), ["full"]);
+    assert_eq!(folder.names(""), ["full"]);
 }

@@ -5,7 +5,6 @@
 use std::path::Path;
 
 use crate::common::*;
-use crate::world::*;
 use hicp_io::bop::{ResultRow, write_results};
 use hybrid_icp::core::{DepthImage, Mask};
 use serde_json::json;
@@ -28,8 +27,8 @@ fn dataset() -> World {
 #[track_caller]
 fn all_fail(world: &World, commands: &[&str], parts: &[&str]) {
     for command in commands {
-        let told = run(world.folder.path(), command.split(' '));
-        told.exits(1).complains(&["error: "]).complains(parts);
+        let told = world.command(command);
+        told.fails(&["error: "]).complains(parts);
     }
 }
 
@@ -49,12 +48,8 @@ fn an_unknown_object_names_the_model_that_is_missing() {
     let world = dataset();
     let pose = world.rows()[0].camera_from_object();
     write_results(world.path("in.csv"), &[ResultRow::new(3, 0, ABSENT, pose)]).unwrap();
-    let refined = run(world.folder.path(), REFINE.split(' ')).exits(0);
-    assert!(
-        refined.out.contains("missing model (object 9)"),
-        "{}",
-        refined.out
-    );
+    let refined = world.command(REFINE).exits(0);
+    refined.prints(&["missing model (object 9)"]);
     all_fail(
         &world,
         &[SHOW],
@@ -64,15 +59,13 @@ fn an_unknown_object_names_the_model_that_is_missing() {
         {"scene_id": 3, "im_id": 0, "obj_id": ABSENT, "inst_count": 1},
         {"scene_id": 3, "im_id": 0, "obj_id": CAR, "inst_count": 2},
     ]);
-    std::fs::write(world.path("asked.json"), target.to_string()).unwrap();
+    world.write("asked.json", target.to_string());
     let words = format!("{EVAL} --targets asked.json");
-    run(world.folder.path(), words.split(' '))
-        .exits(0)
-        .complains(&[
-            "no model for object 9, expected",
-            "obj_000009.ply",
-            "left out",
-        ]);
+    world.command(words).warns(&[
+        "no model for object 9, expected",
+        "obj_000009.ply",
+        "left out",
+    ]);
 }
 
 #[test]
@@ -92,7 +85,7 @@ fn images_name_the_file_and_what_it_should_be() {
     with(&depth, std::fs::read(&other).unwrap(), || {
         let parts = ["000000_00000", "320x240", "000000.png", "4x3", "expected"];
         all_fail(&world, &[REFINE, SHOW], &parts);
-        let told = run(world.folder.path(), EVAL.split(' ')).exits(0);
+        let told = world.command(EVAL).exits(0);
         told.complains(&["warning: "]).complains(&parts);
     });
 
@@ -102,7 +95,7 @@ fn images_name_the_file_and_what_it_should_be() {
     std::fs::remove_file(&depth).unwrap();
     let parts = ["000003/depth/000000.png does not exist"];
     for command in [REFINE, EVAL] {
-        let told = run(world.folder.path(), command.split(' ')).exits(0);
+        let told = world.command(command).exits(0);
         told.complains(&["warning: "]).complains(&parts);
     }
     all_fail(&world, &[SHOW], &parts);

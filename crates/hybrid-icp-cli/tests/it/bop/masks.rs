@@ -1,7 +1,6 @@
 //! `hybrid-icp bop refine`: the choice of rows and of their masks.
 
 use crate::common::*;
-use crate::world::*;
 use hicp_io::bop::{ResultRow, read_results, write_results};
 use hybrid_icp::core::{Isometry3, Mask};
 use serde_json::{Value, json};
@@ -13,41 +12,30 @@ fn without_segmentation_rows_are_refined_in_the_box_around_their_pose() {
     let refinable = rows.len();
     let pose = rows[0].camera_from_object();
     // Nothing was measured around the first pose, and the second is behind the camera.
-    rows.push(ResultRow::new(
-        3,
-        0,
-        CAR,
-        Isometry3::translation(0.0, 0.0, 3.0) * pose,
-    ));
-    rows.push(ResultRow::new(
-        3,
-        0,
-        CAR,
-        Isometry3::translation(0.0, 0.0, -3.0) * pose,
-    ));
-    let (run, refined) = world.refine(&rows, &["--mask", "none", "--no-time"]);
+    for z in [3.0, -3.0] {
+        let moved = Isometry3::translation(0.0, 0.0, z) * pose;
+        rows.push(ResultRow::new(3, 0, CAR, moved));
+    }
+    let (run, refined) = world.refine(&rows, "--mask none --no-time");
     let run = run.exits(0);
     assert_eq!(run.err, "");
-    for line in ["10  refined", "2  kept: nothing measured about the pose"] {
-        assert!(run.out.contains(line), "no {line:?} in {}", run.out);
-    }
+    run.prints(&["10  refined", "2  kept: nothing measured about the pose"]);
     for (before, after) in rows.iter().zip(&refined).take(refinable) {
         world.assert_refined(before, after);
     }
-    let whole = std::fs::read(world.path("out.csv")).unwrap();
+    let whole = world.bytes("out.csv");
 
     // Neither masks nor ground truth are read.
     for scene in [3, 12] {
         std::fs::remove_dir_all(world.scene(scene).join("mask_visib")).unwrap();
-        std::fs::remove_file(world.scene(scene).join("scene_gt.json")).unwrap();
+        world.remove(world.scene(scene).join("scene_gt.json"));
     }
-    let (run, _) = world.refine(&rows, &["--mask", "none", "--no-time", "--threads", "2"]);
+    let (run, _) = world.refine(&rows, "--mask none --no-time --threads 2");
     run.exits(0);
-    assert_eq!(std::fs::read(world.path("out.csv")).unwrap(), whole);
+    assert_eq!(world.bytes("out.csv"), whole);
     world
-        .run(&["--mask", "none", "--detections", "found.json"])
-        .exits(2)
-        .complains(&["--mask", "--detections"]);
+        .run("--mask none --detections found.json")
+        .refuses(&["--mask", "--detections"]);
 }
 
 #[test]
@@ -65,21 +53,17 @@ fn rows_of_one_object_compete_for_its_masks() {
     let astray = (10..40).map(|step| {
         let toward = cars[0].translation.vector - cars[1].translation.vector;
         let shift = f64::from(step) * 0.025 * toward;
-        ResultRow::new(
-            3,
-            0,
-            CAR,
-            Isometry3::translation(shift.x, shift.y, shift.z) * cars[1],
-        )
+        let moved = Isometry3::translation(shift.x, shift.y, shift.z) * cars[1];
+        ResultRow::new(3, 0, CAR, moved)
     });
     let astray = astray.into_iter().find(|row| {
-        let (run, alone) = world.refine(std::slice::from_ref(row), &["--no-time"]);
+        let (run, alone) = world.refine(std::slice::from_ref(row), "--no-time");
         run.exits(0);
         nearest(&alone[0]) == 0
     });
     let astray = astray.unwrap();
     for rows in [[good.clone(), astray.clone()], [astray, good]] {
-        let (run, refined) = world.refine(&rows, &["--no-time"]);
+        let (run, refined) = world.refine(&rows, "--no-time");
         run.exits(0);
         // Each estimate has its own mask.
         let mut found: Vec<usize> = refined.iter().map(nearest).collect();
@@ -90,7 +74,7 @@ fn rows_of_one_object_compete_for_its_masks() {
     // Several estimates of one instance share its mask.
     let hammer = world.truths[&(3, 40)][1].1;
     let rows = [1, 2, 3].map(|seed| ResultRow::new(3, 40, HAMMER, nearby(&hammer, seed)));
-    let (run, refined) = world.refine(&rows, &["--no-time"]);
+    let (run, refined) = world.refine(&rows, "--no-time");
     assert!(run.exits(0).out.contains("3  refined"));
     for (before, after) in rows.iter().zip(&refined) {
         world.assert_refined(before, after);
@@ -111,13 +95,13 @@ fn the_best_rows_of_every_object_are_kept() {
         }
     }
     write_results(world.path("in.csv"), &rows).unwrap();
-    let kept = |options: &[&str]| {
+    let kept = |options: &str| {
         world.run(options).exits(0);
         let rows = read_results(world.path("out.csv")).unwrap();
         let key = |row: &ResultRow| (row.scene_id, row.im_id, row.obj_id, row.score);
         rows.iter().map(key).collect::<Vec<_>>()
     };
-    let best = kept(&["--top-k", "1"]);
+    let best = kept("--top-k 1");
     let expected = [
         (3, 0, CAR, 2.1),
         (3, 40, HAMMER, 2.1),
@@ -132,30 +116,24 @@ fn the_best_rows_of_every_object_are_kept() {
         {"scene_id": 3, "im_id": 40, "obj_id": HAMMER, "inst_count": 1},
         {"scene_id": 3, "im_id": 40, "obj_id": ABSENT, "inst_count": 1},
     ]);
-    std::fs::write(world.path("targets.json"), targets.to_string()).unwrap();
+    world.write("targets.json", targets.to_string());
     let of_targets = [(3, 40, HAMMER, 2.1), (12, 0, CAR, 2.0), (12, 0, CAR, 2.1)];
-    assert_eq!(kept(&["--targets", "targets.json"]), of_targets);
-    let both = kept(&["--targets", "targets.json", "--top-k", "1"]);
+    assert_eq!(kept("--targets targets.json"), of_targets);
+    let both = kept("--targets targets.json --top-k 1");
     assert_eq!(both, [of_targets[0], of_targets[2]]);
     // Shards divide the remaining rows.
-    let mut parts = kept(&["--top-k", "1", "--shard", "1/2"]);
-    parts.extend(kept(&["--top-k", "1", "--shard", "2/2"]));
+    let mut parts = kept("--top-k 1 --shard 1/2");
+    parts.extend(kept("--top-k 1 --shard 2/2"));
     assert_eq!(parts, expected);
 
+    world.run("--top-k 0").refuses(&["--top-k", "1.."]);
     world
-        .run(&["--top-k", "0"])
-        .exits(2)
-        .complains(&["--top-k", "1.."]);
-    world.run(&["--targets", "out.csv"]).exits(1).complains(&[
-        "--output",
-        "--targets",
-        "overwritten",
-    ]);
-    std::fs::write(world.path("targets.json"), "[7]").unwrap();
+        .run("--targets out.csv")
+        .fails(&["--output", "--targets", "overwritten"]);
+    world.write("targets.json", "[7]");
     world
-        .run(&["--targets", "targets.json"])
-        .exits(1)
-        .complains(&["targets.json", "$[0]", "scene_id"]);
+        .run("--targets targets.json")
+        .fails(&["targets.json", "$[0]", "scene_id"]);
 }
 
 /// Replaces the cameras of every image.
@@ -163,7 +141,7 @@ fn set_cameras(world: &World, camera: &Value) {
     for scene in [3, 12] {
         let cameras = json!({"0": camera, "40": camera});
         let path = world.scene(scene).join("scene_camera.json");
-        std::fs::write(path, cameras.to_string()).unwrap();
+        world.write(path, cameras.to_string());
     }
 }
 
@@ -171,9 +149,9 @@ fn set_cameras(world: &World, camera: &Value) {
 fn layouts_of_other_datasets_give_the_same_bytes() {
     let world = World::new();
     let rows = world.rows();
-    let (run, _) = world.refine(&rows, &["--no-time"]);
+    let (run, _) = world.refine(&rows, "--no-time");
     run.exits(0);
-    let output = || std::fs::read(world.path("out.csv")).unwrap();
+    let output = || world.bytes("out.csv");
     let expected = output();
 
     let model = |kind: &str, parameters: &[f64]| {
@@ -184,7 +162,7 @@ fn layouts_of_other_datasets_give_the_same_bytes() {
     };
     let pinhole = [400.0, 402.0, 161.5, 118.0];
     set_cameras(&world, &model("PinholePlane", &pinhole));
-    let (run, _) = world.refine(&rows, &["--no-time"]);
+    let (run, _) = world.refine(&rows, "--no-time");
     run.exits(0);
     assert_eq!(output(), expected);
     let mut large = model("PinholePlane", &pinhole);
@@ -202,51 +180,44 @@ fn layouts_of_other_datasets_give_the_same_bytes() {
         (json!({"depth_scale": 0.1}), &["$.0", "cam_K"]),
     ] {
         set_cameras(&world, &camera);
-        let (run, kept) = world.refine(&rows, &["--no-time"]);
-        run.exits(1)
-            .complains(&["scene_camera.json"])
-            .complains(parts);
+        let (run, kept) = world.refine(&rows, "--no-time");
+        run.fails(&["scene_camera.json"]).complains(parts);
         assert!(rows.iter().zip(&kept).all(|(a, b)| same_pose(a, b)));
     }
     set_cameras(&world, &serde_json::from_str(BOP_CAMERA).unwrap());
 
     for split in ["test_primesense", "train_pbr"] {
         std::fs::rename(world.path("test"), world.path(split)).unwrap();
-        world
-            .run(&["--no-time"])
-            .exits(1)
-            .complains(&["split is missing", "test"]);
+        world.run("--no-time").fails(&["split is missing", "test"]);
         let words = format!(
             "bop refine --dataset . --split {split} --results in.csv --output out.csv --no-time"
         );
-        run_words(&world, &words).exits(0);
+        world.command(words).exits(0);
         assert_eq!(output(), expected);
         std::fs::rename(world.path(split), world.path("test")).unwrap();
     }
 
     // Some datasets have gray images instead of color images. The evaluation checks their size.
     let gray = world.scene(3).join("gray");
-    std::fs::create_dir(&gray).unwrap();
+    world.create_dir(&gray);
     hicp_io::write_mask_png(gray.join("000000.png"), &Mask::full(320, 240)).unwrap();
     hicp_io::write_mask_png(gray.join("000040.png"), &Mask::full(32, 24)).unwrap();
-    let told = run_words(&world, "bop eval --dataset . --results in.csv").exits(0);
+    let told = world
+        .command("bop eval --dataset . --results in.csv")
+        .exits(0);
     let told = told.complains(&["gray/000040.png is 32x24 pixels, expected 320x240"]);
     assert!(!told.err.contains("gray/000000.png"), "{}", told.err);
-}
-
-fn run_words(world: &World, words: &str) -> Run {
-    run(world.folder.path(), words.split(' '))
 }
 
 #[test]
 fn a_sensor_of_several_gives_the_same_bytes() {
     let world = World::new();
     let rows = world.rows();
-    let (run, _) = world.refine(&rows, &["--no-time"]);
+    let (run, _) = world.refine(&rows, "--no-time");
     run.exits(0);
-    let whole = std::fs::read(world.path("out.csv")).unwrap();
+    let whole = world.bytes("out.csv");
     for scene in [3, 12] {
-        for name in names(&world.scene(scene)) {
+        for name in world.names(world.scene(scene)) {
             let (stem, extension) = name
                 .split_once('.')
                 .map_or((&*name, ""), |(s, _)| (s, ".json"));
@@ -254,11 +225,11 @@ fn a_sensor_of_several_gives_the_same_bytes() {
             std::fs::rename(world.scene(scene).join(&name), to).unwrap();
         }
     }
-    let (run, _) = world.refine(&rows, &["--no-time", "--sensor", "cam1"]);
+    let (run, _) = world.refine(&rows, "--no-time --sensor cam1");
     assert_eq!(run.exits(0).err, "");
-    assert_eq!(std::fs::read(world.path("out.csv")).unwrap(), whole);
-    let (run, _) = world.refine(&rows, &[]);
-    run.exits(1).complains(&[
+    assert_eq!(world.bytes("out.csv"), whole);
+    let (run, _) = world.refine(&rows, "");
+    run.fails(&[
         "scene_camera.json",
         "file of cameras (or --sensor cam1) is missing",
     ]);

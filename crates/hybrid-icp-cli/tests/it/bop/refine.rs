@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::common::*;
-use crate::world::*;
-use hicp_io::bop::{ResultRow, Rle, read_results, write_results};
+use hicp_io::bop::{ResultRow, read_results, write_results};
 use hybrid_icp::core::{Isometry3, Mask};
 use serde_json::{Value, json};
 
@@ -12,15 +11,15 @@ use serde_json::{Value, json};
 fn every_row_is_refined_against_its_own_instance() {
     let world = World::new();
     let rows = world.rows();
-    let (run, refined) = world.refine(&rows, &[]);
+    let (run, refined) = world.refine(&rows, "");
     let run = run.exits(0);
     assert_eq!(run.err, "");
-    assert!(run.out.contains("10 rows of 4 frames"), "{}", run.out);
+    run.prints(&["10 rows of 4 frames"]);
     assert!(run.out.contains("10  refined") && run.out.contains("median MVE"));
     for (before, after) in rows.iter().zip(&refined) {
         world.assert_refined(before, after);
     }
-    let text = std::fs::read_to_string(world.path("out.csv")).unwrap();
+    let text = world.read("out.csv");
     assert!(text.starts_with("scene_id,im_id,obj_id,score,R,t,time\n"));
     assert!(!text.contains("NaN") && !text.contains("inf"));
 }
@@ -29,13 +28,11 @@ fn every_row_is_refined_against_its_own_instance() {
 fn other_hypotheses_follow_the_rows() {
     let world = World::new();
     let rows = world.rows();
-    let always = ["--set", "threshold=0"];
-    let search = [&["--pipeline", "search", "--no-time"][..], &always].concat();
-    let (run, refined) = world.refine(&rows, &search);
+    let search = "--pipeline search --no-time --set threshold=0";
+    let (run, refined) = world.refine(&rows, search);
     run.exits(0);
-    let options = [&search[..], &["--hypotheses", "3"]].concat();
-    let run = world.run(&options).exits(0);
-    assert!(run.out.contains("10 rows of 4 frames"), "{}", run.out);
+    let run = world.run(&format!("{search} --hypotheses 3")).exits(0);
+    run.prints(&["10 rows of 4 frames"]);
     let all = read_results(world.path("out.csv")).unwrap();
     assert_eq!(all[..rows.len()], refined);
     let others = &all[rows.len()..];
@@ -60,11 +57,11 @@ fn threads_do_not_change_a_byte() {
     let world = World::new();
     let rows = world.rows();
     let mut outputs = Vec::new();
-    for threads in ["1", "2", "7"] {
-        let (run, refined) = world.refine(&rows, &["--no-time", "--threads", threads]);
+    for threads in [1, 2, 7] {
+        let (run, refined) = world.refine(&rows, &format!("--no-time --threads {threads}"));
         run.exits(0);
         assert!(refined.iter().all(|row| row.time_s.is_none()));
-        outputs.push(std::fs::read(world.path("out.csv")).unwrap());
+        outputs.push(world.bytes("out.csv"));
     }
     assert!(outputs.iter().all(|output| output == &outputs[0]));
     let text = String::from_utf8(outputs.remove(0)).unwrap();
@@ -84,7 +81,7 @@ fn the_time_is_the_same_on_all_rows_of_an_image() {
             _ => None,
         };
     }
-    let (run, refined) = world.refine(&rows, &[]);
+    let (run, refined) = world.refine(&rows, "");
     run.exits(0);
     let mut times: BTreeMap<(u32, u32), f64> = BTreeMap::new();
     for row in &refined {
@@ -123,17 +120,15 @@ fn rows_that_cannot_be_refined_are_kept_and_counted() {
     for row in &mut rows {
         row.score = 0.123_456_789;
     }
-    let (run, refined) = world.refine(&rows, &[]);
+    let (run, refined) = world.refine(&rows, "");
     let run = run.exits(0);
-    for line in [
+    run.prints(&[
         "10  refined",
         "1  kept: missing model (object 9)",
         "1  kept: no mask of the object",
         "2  kept: no overlap with a mask of the object",
         "2  kept: missing frame",
-    ] {
-        assert!(run.out.contains(line), "no {line:?} in {}", run.out);
-    }
+    ]);
     let warnings: Vec<&str> = run.err.lines().collect();
     assert_eq!(warnings.len(), 2, "{}", run.err);
     assert!(warnings.iter().all(|line| line.starts_with("warning: ")));
@@ -152,36 +147,31 @@ fn rows_that_cannot_be_refined_are_kept_and_counted() {
     // The numbers are those of the file, although its rotation is orthogonal to only nine digits.
     let numbers = "0.768311175 -0.0665434694 0.636608126 0.311033385 0.908074697 -0.280461366 -0.559424858 0.413487982 0.718381178,78.6667817 -7.67105284 1035.65777";
     let text = format!("scene_id,im_id,obj_id,score,R,t,time\n3,0,9,0.5,{numbers},1.25\n");
-    std::fs::write(world.path("in.csv"), &text).unwrap();
-    world.run(&[]).exits(0);
-    assert_eq!(
-        std::fs::read_to_string(world.path("out.csv")).unwrap(),
-        text
-    );
+    world.write("in.csv", &text);
+    world.run("").exits(0);
+    assert_eq!(world.read("out.csv"), text);
 }
 
 #[test]
 fn missing_files_cost_their_rows_only() {
     let world = World::new();
     let rows = world.rows();
-    std::fs::remove_file(world.depth_path(3, 0)).unwrap();
-    std::fs::remove_file(world.mask_path(12, 40, 1)).unwrap();
+    world.remove(world.depth_path(3, 0));
+    world.remove(world.mask_path(12, 40, 1));
     // One of two cars loses its mask, so its row overlaps no mask.
-    std::fs::remove_file(world.mask_path(12, 0, 0)).unwrap();
-    let (run, refined) = world.refine(&rows, &[]);
-    let run = run.exits(0).complains(&[
+    world.remove(world.mask_path(12, 0, 0));
+    let (run, refined) = world.refine(&rows, "");
+    let run = run.warns(&[
         "warning: depth image is missing: ./test/000003/depth/000000.png",
         "warning: mask is missing: ./test/000012/mask_visib/0000",
         "(and 1 more like it)",
     ]);
-    for line in [
+    run.prints(&[
         "6  refined",
         "2  kept: missing frame",
         "1  kept: no mask",
         "1  kept: no overlap",
-    ] {
-        assert!(run.out.contains(line), "no {line:?} in {}", run.out);
-    }
+    ]);
     for (before, after) in rows.iter().zip(&refined) {
         if !same_pose(before, after) {
             world.assert_refined(before, after);
@@ -197,16 +187,15 @@ fn missing_ground_truth_is_reported_if_masks_depend_on_it() {
     let world = World::new();
     let rows = world.rows();
     let path = world.scene(3).join("scene_gt.json");
-    let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(&path, text.replace("\"40\":", "\"41\":")).unwrap();
-    let (run, _) = world.refine(&rows, &[]);
-    let run = run.exits(0).complains(&[
+    world.replace(&path, "\"40\":", "\"41\":");
+    let (run, _) = world.refine(&rows, "");
+    let run = run.warns(&[
         "warning: ground truth is missing: ./test/000003/scene_gt.json does not have image 40",
     ]);
-    assert!(run.out.contains("3  kept: no mask"), "{}", run.out);
-    std::fs::remove_file(&path).unwrap();
-    let (run, _) = world.refine(&rows, &[]);
-    assert!(run.out.contains("5  kept: no mask"), "{}", run.out);
+    run.prints(&["3  kept: no mask"]);
+    world.remove(&path);
+    let (run, _) = world.refine(&rows, "");
+    run.prints(&["5  kept: no mask"]);
     // It is missing for both images, but reported once.
     assert_eq!(
         run.exits(0).err,
@@ -214,7 +203,7 @@ fn missing_ground_truth_is_reported_if_masks_depend_on_it() {
          warning: rows without a mask of the ground truth need --detections FILE or --mask none\n"
     );
     // With masks from a file, it is not required.
-    let (run, _) = world.refine(&rows, &["--mask", "none"]);
+    let (run, _) = world.refine(&rows, "--mask none");
     assert_eq!(run.exits(0).err, "");
 }
 
@@ -228,32 +217,23 @@ fn errors_are_reported_even_if_the_summary_cannot_be_written() {
     let world = World::new();
     write_results(world.path("in.csv"), &world.rows()).unwrap();
     let depth = world.depth_path(3, 40);
-    std::fs::write(&depth, "no image").unwrap();
-    std::fs::remove_file(world.depth_path(12, 40)).unwrap();
+    world.write(&depth, "no image");
+    world.remove(world.depth_path(12, 40));
     let words = "bop refine --dataset . --results in.csv --output out.csv --no-time";
     let told = || {
         let full = std::fs::File::options().write(true).open("/dev/full");
-        let full = full.unwrap();
-        let mut command = program(world.folder.path());
-        let output = command.args(words.split(' ')).stdout(full).output();
-        let output = output.unwrap();
-        assert_eq!(output.status.code(), Some(1));
-        String::from_utf8(output.stderr).unwrap()
+        let mut command = program(world.root());
+        command.args(words.split(' ')).stdout(full.unwrap());
+        Run::from(command.output().unwrap()).exits(1)
     };
-    let err = told();
-    for part in [
+    told().complains(&[
         "warning: depth image is missing",
         "error: ./test/000003/depth/000040.png",
         "error: 1 files could not be used",
-    ] {
-        assert!(err.contains(part), "no {part:?} in: {err}");
-    }
+    ]);
     // Without the damaged file, the summary is the only error.
-    std::fs::remove_file(&depth).unwrap();
-    let err = told();
-    for part in ["warning: depth", "error: cannot write to standard output"] {
-        assert!(err.contains(part), "no {part:?} in: {err}");
-    }
+    world.remove(&depth);
+    told().complains(&["warning: depth", "error: cannot write to standard output"]);
 }
 
 #[test]
@@ -269,13 +249,11 @@ fn damaged_files_are_reported_and_the_rest_is_written() {
         (world.path("models/obj_000001.ply"), "obj_000001.ply"),
         (world.scene(12).join("scene_gt.json"), "scene_gt.json"),
     ] {
-        let whole = std::fs::read(&path).unwrap();
-        std::fs::write(&path, &whole[..whole.len() / 3]).unwrap();
-        let (run, refined) = world.refine(&rows, &[]);
-        let run =
-            run.exits(1)
-                .complains(&["error: ", name, "1 files could not be used", "out.csv"]);
-        assert!(run.out.contains("kept: damaged file"), "{}", run.out);
+        let whole = world.bytes(&path);
+        world.write(&path, &whole[..whole.len() / 3]);
+        let (run, refined) = world.refine(&rows, "");
+        let run = run.fails(&["error: ", name, "1 files could not be used", "out.csv"]);
+        run.prints(&["kept: damaged file"]);
         let changed = rows.iter().zip(&refined).filter(|(a, b)| !same_pose(a, b));
         let changed: Vec<_> = changed.collect();
         assert!(!changed.is_empty() && changed.len() < rows.len());
@@ -283,62 +261,38 @@ fn damaged_files_are_reported_and_the_rest_is_written() {
             world.assert_refined(before, after);
         }
         // An unreadable file does not count as missing.
-        std::fs::remove_file(&path).unwrap();
-        std::fs::create_dir(&path).unwrap();
-        let (run, _) = world.refine(&rows, &[]);
-        let run = run.exits(1).complains(&["error: ", name, "a folder"]);
-        assert!(run.out.contains("kept: damaged file"), "{}", run.out);
+        world.remove(&path);
+        world.create_dir(&path);
+        let (run, _) = world.refine(&rows, "");
+        let run = run.fails(&["error: ", name, "a folder"]);
+        run.prints(&["kept: damaged file"]);
         std::fs::remove_dir(&path).unwrap();
-        std::fs::write(&path, whole).unwrap();
+        world.write(&path, whole);
     }
 
     let small = Mask::full(32, 24);
     hicp_io::write_mask_png(world.mask_path(12, 40, 1), &small).unwrap();
-    let (run, _) = world.refine(&rows, &[]);
-    run.exits(1)
-        .complains(&["000040_000001.png is 32x24", "000040.png is 320x240"]);
+    let (run, _) = world.refine(&rows, "");
+    run.fails(&["000040_000001.png is 32x24", "000040.png is 320x240"]);
 
     let camera = world.scene(3).join("scene_camera.json");
-    let text = std::fs::read_to_string(&camera).unwrap();
-    std::fs::write(&camera, text.replace("400", "0")).unwrap();
-    let (run, _) = world.refine(&rows, &[]);
-    run.exits(1)
-        .complains(&["scene_camera.json", "$.0.cam_K", "fx is 0", "above 0"]);
+    world.replace(&camera, "400", "0");
+    let (run, _) = world.refine(&rows, "");
+    run.fails(&["scene_camera.json", "$.0.cam_K", "fx is 0", "above 0"]);
 }
 
 #[test]
 fn masks_of_a_detections_file_are_the_same_masks() {
     let world = World::new();
     let rows = world.rows();
-    let (run, reference) = world.refine(&rows, &["--no-time"]);
+    let (run, reference) = world.refine(&rows, "--no-time");
     run.exits(0);
     for compressed in [true, false] {
-        let mut detections = Vec::new();
-        for ((scene, image), truths) in &world.truths {
-            for (instance, (id, _)) in truths.iter().enumerate() {
-                let mask =
-                    hicp_io::read_mask_png(world.mask_path(*scene, *image, instance)).unwrap();
-                let rle = Rle::of_mask(&mask);
-                let counts = if compressed {
-                    json!(rle.to_compressed())
-                } else {
-                    json!(rle.counts())
-                };
-                detections.push(json!({
-                    "scene_id": scene, "image_id": image, "category_id": id, "score": 0.9,
-                    "bbox": [0, 0, 1, 1], "time": 0.1,
-                    "segmentation": {"size": [240, 320], "counts": counts},
-                }));
-            }
-        }
+        let mut detections = world.detections(|_| compressed);
         // A detection without a segmentation and a box is ignored.
         detections.push(json!({"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1}));
-        std::fs::write(
-            world.path("found.json"),
-            Value::from(detections.clone()).to_string(),
-        )
-        .unwrap();
-        let (run, refined) = world.refine(&rows, &["--no-time", "--detections", "found.json"]);
+        world.write("found.json", Value::from(detections).to_string());
+        let (run, refined) = world.refine(&rows, "--no-time --detections found.json");
         run.exits(0);
         assert_eq!(refined, reference);
 
@@ -350,10 +304,10 @@ fn masks_of_a_detections_file_are_the_same_masks() {
                 std::fs::rename(file, aside).unwrap();
             }
         }
-        let (run, refined) = world.refine(&rows, &["--no-time", "--detections", "found.json"]);
+        let (run, refined) = world.refine(&rows, "--no-time --detections found.json");
         run.exits(0);
         assert_eq!(refined, reference);
-        let (run, _) = world.refine(&rows, &[]);
+        let (run, _) = world.refine(&rows, "");
         assert!(run.exits(0).out.contains("10  kept: no mask of the object"));
         for scene in [3, 12] {
             let file = world.scene(scene).join("scene_gt.json");
@@ -361,51 +315,35 @@ fn masks_of_a_detections_file_are_the_same_masks() {
         }
     }
     // The box of a detection is used if it has no segmentation, and no detection is an error.
-    let mask = hicp_io::read_mask_png(world.mask_path(12, 40, 1)).unwrap();
-    let shown = mask.bounding_region();
-    let bbox = [
-        shown.u_min as usize,
-        shown.v_min as usize,
-        shown.width(),
-        shown.height(),
-    ];
-    let mut detections =
-        json!([{"scene_id": 12, "image_id": 40, "category_id": HAMMER, "score": 1, "bbox": bbox}]);
-    std::fs::write(world.path("found.json"), detections.to_string()).unwrap();
-    let told = world.run(&["--detections", "found.json"]).exits(0).out;
-    assert!(
-        told.contains("1  refined") && told.contains("9  kept: no mask"),
-        "{told}"
-    );
+    let mut detections = world.detections(|_| true).into_iter();
+    let hammer = detections.find(|found| found["category_id"] == HAMMER);
+    let mut detections = json!([hammer.unwrap()]);
+    detections[0]
+        .as_object_mut()
+        .unwrap()
+        .remove("segmentation");
+    world.write("found.json", detections.to_string());
+    let told = world.run("--detections found.json").exits(0).out;
+    assert_contains(&told, &["1  refined", "9  kept: no mask"]);
     detections[0]["image_id"] = json!(41);
-    std::fs::write(world.path("found.json"), detections.to_string()).unwrap();
+    world.write("found.json", detections.to_string());
     world
-        .run(&["--detections", "found.json"])
-        .exits(1)
-        .complains(&["in.csv: none of its rows has a detection", "image_id"]);
-    std::fs::write(
-        world.path("found.json"),
-        r#"[{"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1, "segmentation": {"size": [240, 320], "counts": [7]}}]"#,
-    )
-    .unwrap();
-    world
-        .run(&["--detections", "found.json"])
-        .exits(1)
-        .complains(&[
-            "found.json",
-            "$[0].segmentation",
-            "cover 7 pixels",
-            "expected 76800",
-        ]);
-    std::fs::write(
-        world.path("found.json"),
-        r#"[{"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1, "segmentation": {"size": [1, 7], "counts": [0, 7]}}]"#,
-    )
-    .unwrap();
-    world
-        .run(&["--detections", "found.json"])
-        .exits(1)
-        .complains(&["7x1", "320x240", "--detections"]);
+        .run("--detections found.json")
+        .fails(&["in.csv: none of its rows has a detection", "image_id"]);
+    let outline = |size: [u32; 2], counts: &[u32]| {
+        let segmentation = json!({"size": size, "counts": counts});
+        let detection = json!([{"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1, "segmentation": segmentation}]);
+        world.write("found.json", detection.to_string());
+        world.run("--detections found.json")
+    };
+    let parts = [
+        "found.json",
+        "$[0].segmentation",
+        "cover 7 pixels",
+        "expected 76800",
+    ];
+    outline([240, 320], &[7]).fails(&parts);
+    outline([1, 7], &[0, 7]).fails(&["7x1", "320x240", "--detections"]);
 }
 
 #[test]
@@ -413,73 +351,56 @@ fn failures_before_the_refinement_change_no_file() {
     let world = World::new();
     let rows = world.rows();
     write_results(world.path("in.csv"), &rows).unwrap();
-    std::fs::write(world.path("out.csv"), "the user's").unwrap();
-    let fails = |options: &[&str], parts: &[&str]| {
-        let told = run(world.folder.path(), ["bop", "refine"].iter().chain(options)).exits(1);
-        let told = told.complains(parts);
+    world.write("out.csv", "the user's");
+    let fails = |options: &str, parts: &[&str]| {
+        let told = world.command(format!("bop refine {options}")).fails(parts);
         assert_eq!(told.out, "");
-        assert_eq!(std::fs::read(world.path("out.csv")).unwrap(), b"the user's");
+        assert_eq!(world.bytes("out.csv"), b"the user's");
     };
-    let dataset = ["--dataset", "."];
-    let results = ["--results", "in.csv"];
-    let output = ["--output", "out.csv"];
     fails(
-        &[&["--dataset", "gone"], &results[..], &output].concat(),
+        "--dataset gone --results in.csv --output out.csv",
         &["dataset folder", "gone"],
     );
     fails(
-        &[&dataset, &results[..], &output, &["--split", "tset"]].concat(),
+        "--dataset . --results in.csv --output out.csv --split tset",
         &["split is missing", "tset"],
     );
     fails(
-        &[&dataset, &["--results", "gone.csv"][..], &output].concat(),
+        "--dataset . --results gone.csv --output out.csv",
         &["cannot read gone.csv"],
     );
     fails(
-        &[&dataset, &results[..], &["--output", "no/out.csv"]].concat(),
+        "--dataset . --results in.csv --output no/out.csv",
         &["cannot write no/out.csv", "folder no does not exist"],
     );
     fails(
-        &[
-            &dataset,
-            &results[..],
-            &output,
-            &["--detections", "out.csv"],
-        ]
-        .concat(),
+        "--dataset . --results in.csv --output out.csv --detections out.csv",
         &["--output", "--detections", "overwritten"],
     );
-    for (from, to, parts) in [
-        ("scene_id,", "", &["in.csv", "line 1", "scene_id"][..]),
+    let text = world.read("in.csv");
+    let damaged = |from: &str, to: &str| text.replacen(from, to, 1);
+    let reflected = "scene_id,im_id,obj_id,score,R,t,time\n3,0,1,1,1 0 0 0 1 0 0 0 -1,0 0 500,-1\n";
+    for (text, parts) in [
         (
-            ",-1\n",
-            ",soon\n",
-            &["in.csv", "line 2", "\"time\"", "\"soon\"", "seconds"],
+            damaged("scene_id,", ""),
+            &["bad.csv", "line 1", "scene_id"][..],
         ),
         (
-            "\n12,",
-            "\nx,",
-            &["in.csv", "\"scene_id\"", "\"x\"", "integer"],
+            damaged(",-1\n", ",soon\n"),
+            &["bad.csv", "line 2", "\"time\"", "\"soon\"", "seconds"],
+        ),
+        (
+            damaged("\n12,", "\nx,"),
+            &["bad.csv", "\"scene_id\"", "\"x\"", "integer"],
+        ),
+        (
+            reflected.to_owned(),
+            &["bad.csv", "line 2", "\"R\"", "determinant -1"],
         ),
     ] {
-        let text = std::fs::read_to_string(world.path("in.csv")).unwrap();
-        std::fs::write(world.path("bad.csv"), text.replacen(from, to, 1)).unwrap();
-        let parts: Vec<_> = parts
-            .iter()
-            .map(|part| part.replace("in.csv", "bad.csv"))
-            .collect();
-        let parts: Vec<_> = parts.iter().map(String::as_str).collect();
-        fails(
-            &[&dataset, &["--results", "bad.csv"][..], &output].concat(),
-            &parts,
-        );
+        world.write("bad.csv", text);
+        fails("--dataset . --results bad.csv --output out.csv", parts);
     }
-    let reflected = "scene_id,im_id,obj_id,score,R,t,time\n3,0,1,1,1 0 0 0 1 0 0 0 -1,0 0 500,-1\n";
-    std::fs::write(world.path("bad.csv"), reflected).unwrap();
-    fails(
-        &[&dataset, &["--results", "bad.csv"][..], &output].concat(),
-        &["bad.csv", "line 2", "\"R\"", "determinant -1"],
-    );
 }
 
 #[test]
@@ -487,16 +408,16 @@ fn a_result_file_can_be_refined_in_place_and_may_be_empty() {
     let world = World::new();
     let rows = world.rows();
     write_results(world.path("in.csv"), &rows).unwrap();
-    world.run(&["--output", "in.csv"]).exits(2);
+    world.run("--output in.csv").exits(2);
     let words = "bop refine --dataset . --results in.csv --output in.csv";
-    run(world.folder.path(), words.split(' ')).exits(0);
+    world.command(words).exits(0);
     for (before, after) in rows
         .iter()
         .zip(&read_results(world.path("in.csv")).unwrap())
     {
         world.assert_refined(before, after);
     }
-    let (run, refined) = world.refine(&[], &[]);
+    let (run, refined) = world.refine(&[], "");
     assert!(run.exits(0).out.contains("0 rows"));
     assert!(refined.is_empty());
 }
@@ -509,8 +430,7 @@ fn a_dataset_without_any_of_the_frames_is_an_error() {
         ResultRow::new(3, 5, CAR, pose),
         ResultRow::new(99, 0, CAR, pose),
     ];
-    let (run, refined) = world.refine(&rows, &[]);
-    run.exits(1)
-        .complains(&["in.csv", "none of its frames", "--split"]);
+    let (run, refined) = world.refine(&rows, "");
+    run.fails(&["in.csv", "none of its frames", "--split"]);
     assert!(rows.iter().zip(&refined).all(|(a, b)| same_pose(a, b)));
 }

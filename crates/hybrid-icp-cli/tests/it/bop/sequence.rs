@@ -3,9 +3,6 @@
 //! Fused poses are near the truth, images without the object are handled, and wrong inputs are
 //! refused.
 
-use std::fs;
-use std::path::Path;
-
 use crate::common::*;
 use hicp_io::LengthUnit;
 use hicp_io::bop::{Dataset, Rle, Scene, read_results};
@@ -14,40 +11,38 @@ use serde_json::{Value, json};
 
 const IMAGES: usize = 7;
 const SEQUENCE: &str = "bop sequence --dataset set --scene 1 --object 1 --output out.jsonl --init";
+const CAMERAS: &str = "set/test/000001/scene_camera.json";
 const INITIAL: &str = "set/initial_synthetic-test.csv";
 
 /// Creates three equal cars on a table, seen along a path; only the pose selects one of them.
-fn cars() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::create_dir(folder.path().join("meshes")).unwrap();
-    let mesh = folder.path().join("meshes/car.ply");
+fn cars() -> Folder {
+    let folder = Folder::new();
+    folder.create_dir("meshes");
+    let mesh = folder.path("meshes/car.ply");
     hicp_io::write_ply(mesh, &car(), LengthUnit::Meters).unwrap();
     let words = "bop generate --objects meshes --scenes 1 --images 7 --instances 3 --seed 5 --trajectory --out set";
-    run(folder.path(), words.split(' ')).exits(0);
+    folder.command(words).exits(0);
     folder
 }
 
 #[track_caller]
-fn sequence(folder: &Path, init: &str, options: &str) -> Run {
+fn sequence(folder: &Folder, init: &str, options: &str) -> Run {
     let words = format!("{SEQUENCE} {init} {options}");
-    run(folder, words.split_whitespace())
+    folder.command(words)
 }
 
-fn lines(folder: &Path) -> Vec<Value> {
-    let text = fs::read_to_string(folder.join("out.jsonl")).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+fn lines(folder: &Folder) -> Vec<Value> {
+    folder.json_lines("out.jsonl")
 }
 
-fn scene(folder: &Path) -> Scene {
-    let dataset = Dataset::open(folder.join("set")).unwrap();
+fn scene(folder: &Folder) -> Scene {
+    let dataset = Dataset::open(folder.path("set")).unwrap();
     dataset.scene("test", 1).unwrap()
 }
 
 /// Returns the instance whose perturbed pose comes first, and its true poses by image.
-fn followed(folder: &Path) -> (usize, Vec<Isometry3<f64>>) {
-    let init = read_results(folder.join(INITIAL)).unwrap()[0].camera_from_object();
+fn followed(folder: &Folder) -> (usize, Vec<Isometry3<f64>>) {
+    let init = read_results(folder.path(INITIAL)).unwrap()[0].camera_from_object();
     let scene = scene(folder);
     let near = |pose: &Isometry3<f64>| (pose.translation.vector - init.translation.vector).norm();
     let truths = scene.ground_truth(0).unwrap();
@@ -68,22 +63,17 @@ fn off(pose: &Isometry3<f64>, truth: &Isometry3<f64>) -> (f64, f64) {
 #[test]
 fn one_of_three_equal_cars_is_followed() {
     let folder = cars();
-    let folder = folder.path();
-    let (instance, truths) = followed(folder);
+    let (instance, truths) = followed(&folder);
     // The camera moves, so the object moves in the camera frame.
     assert!(off(&truths[0], &truths[6]).1 > 0.05);
     for fuser in ["weighted-average", "filtering --uncertainty mve"] {
         let options = format!("--results fused.csv --fuser {fuser}");
-        let told = sequence(folder, INITIAL, &options).exits(0);
+        let told = sequence(&folder, INITIAL, &options).exits(0);
         assert_eq!(told.err, "");
-        assert!(
-            told.out.contains("7 images of scene 1") && told.out.contains("mm fused"),
-            "{}",
-            told.out
-        );
-        let lines = lines(folder);
+        told.prints(&["7 images of scene 1", "mm fused"]);
+        let lines = lines(&folder);
         assert_eq!(lines.len(), IMAGES);
-        let fused = read_results(folder.join("fused.csv")).unwrap();
+        let fused = read_results(folder.path("fused.csv")).unwrap();
         for (im_id, (line, truth)) in lines.iter().zip(&truths).enumerate() {
             assert_eq!(
                 (&line["im_id"], &line["obj_id"]),
@@ -112,10 +102,9 @@ fn one_of_three_equal_cars_is_followed() {
 #[test]
 fn detections_replace_the_ground_truth() {
     let folder = cars();
-    let folder = folder.path();
-    sequence(folder, INITIAL, "").exits(0);
-    let expected = lines(folder);
-    let opened = scene(folder);
+    sequence(&folder, INITIAL, "").exits(0);
+    let expected = lines(&folder);
+    let opened = scene(&folder);
     let mut detections = Vec::new();
     for im_id in 0..IMAGES as u32 {
         for instance in 0..3 {
@@ -127,12 +116,12 @@ fn detections_replace_the_ground_truth() {
         }
     }
     let text = Value::from(detections).to_string();
-    fs::write(folder.join("found.json"), text).unwrap();
-    fs::remove_file(folder.join("set/test/000001/scene_gt.json")).unwrap();
-    let refused = sequence(folder, INITIAL, "").exits(1);
+    folder.write("found.json", text);
+    folder.remove("set/test/000001/scene_gt.json");
+    let refused = sequence(&folder, INITIAL, "").exits(1);
     refused.complains(&["scene_gt.json does not exist", "--detections"]);
-    sequence(folder, INITIAL, "--detections found.json").exits(0);
-    for (line, expected) in lines(folder).iter().zip(&expected) {
+    sequence(&folder, INITIAL, "--detections found.json").exits(0);
+    for (line, expected) in lines(&folder).iter().zip(&expected) {
         for key in ["cam_t_m2c", "covariance", "confidence", "single"] {
             assert_eq!(line[key], expected[key], "{key}");
         }
@@ -144,17 +133,16 @@ fn detections_replace_the_ground_truth() {
 #[test]
 fn impossible_scales_and_sizes_are_warned_of() {
     let folder = cars();
-    let folder = folder.path();
-    let cameras = folder.join("set/test/000001/scene_camera.json");
-    let text = fs::read_to_string(&cameras).unwrap();
+    let text = folder.read(CAMERAS);
     let scaled = |factor: f64| {
-        let mut value: Value = serde_json::from_str(&text).unwrap();
-        for camera in value.as_object_mut().unwrap().values_mut() {
-            let scale = camera["depth_scale"].as_f64().unwrap();
-            camera["depth_scale"] = (factor * scale).into();
-        }
-        fs::write(&cameras, value.to_string()).unwrap();
-        sequence(folder, INITIAL, "").exits(0)
+        folder.write(CAMERAS, &text);
+        folder.change_json(CAMERAS, |value| {
+            for camera in value.as_object_mut().unwrap().values_mut() {
+                let scale = camera["depth_scale"].as_f64().unwrap();
+                camera["depth_scale"] = (factor * scale).into();
+            }
+        });
+        sequence(&folder, INITIAL, "").exits(0)
     };
     let none = format!(
         "warning: out.jsonl: an estimate is accepted in none of its 7 images: do not trust its poses, \
@@ -165,27 +153,22 @@ fn impossible_scales_and_sizes_are_warned_of() {
     let told = scaled(10.0).err;
     let begin = "warning: object 1 in image 0 of scene 1: the median depth inside the mask is ";
     assert!(told.starts_with(begin) && told.ends_with(none), "{told}");
-    assert!(
-        told.contains(": check depth_scale in scene_camera.json, and that --init is in mm\n"),
-        "{told}"
+    assert_contains(
+        &told,
+        &[": check depth_scale in scene_camera.json, and that --init is in mm\n"],
     );
     assert_eq!(told.lines().count(), 2, "{told}");
     // A pose file has its own unit.
-    fs::write(
-        folder.join("init.json"),
-        pose_json(&followed(folder).1[0]).to_string(),
-    )
-    .unwrap();
-    let told = sequence(folder, "init.json", "").exits(0);
+    folder.write("init.json", pose_json(&followed(&folder).1[0]).to_string());
+    let told = sequence(&folder, "init.json", "").exits(0);
     told.complains(&["check depth_scale in scene_camera.json, and --init-unit\n"]);
 
-    fs::write(&cameras, &text).unwrap();
-    let info = folder.join("set/models/models_info.json");
-    let mut value: Value = serde_json::from_str(&fs::read_to_string(&info).unwrap()).unwrap();
-    let diameter = value["1"]["diameter"].as_f64().unwrap();
-    value["1"]["diameter"] = (1e3 * diameter).into();
-    fs::write(&info, value.to_string()).unwrap();
-    let told = sequence(folder, INITIAL, "").exits(0).err;
+    folder.write(CAMERAS, &text);
+    folder.change_json("set/models/models_info.json", |value| {
+        let diameter = value["1"]["diameter"].as_f64().unwrap();
+        value["1"]["diameter"] = (1e3 * diameter).into();
+    });
+    let told = sequence(&folder, INITIAL, "").exits(0).err;
     let first = told.lines().next().unwrap();
     assert!(
         first.contains("models_info.json: object 1: the stated diameter is "),
@@ -197,22 +180,19 @@ fn impossible_scales_and_sizes_are_warned_of() {
 #[test]
 fn images_without_the_object_move_the_pose_with_the_camera() {
     let folder = cars();
-    let folder = folder.path();
-    let (_, truths) = followed(folder);
-    let scene_dir = folder.join("set/test/000001");
+    let (_, truths) = followed(&folder);
+    let scene_dir = folder.path("set/test/000001");
     // Image 2 has no masks, image 4 has no depth.
     for instance in 0..3 {
-        fs::remove_file(scene(folder).visible_mask_path(2, instance)).unwrap();
+        folder.remove(scene(&folder).visible_mask_path(2, instance));
     }
-    fs::remove_file(scene_dir.join("depth/000004.png")).unwrap();
-    let told = sequence(folder, INITIAL, "").exits(0);
-    for part in [
+    folder.remove(scene_dir.join("depth/000004.png"));
+    let told = sequence(&folder, INITIAL, "").exits(0);
+    told.prints(&[
         "1  moved with the camera: no mask of the object",
         "no depth image",
-    ] {
-        assert!(told.out.contains(part), "{}", told.out);
-    }
-    let fused = lines(folder);
+    ]);
+    let fused = lines(&folder);
     for (im_id, reason) in [(2, "mask"), (4, "depth")] {
         let (before, line) = (&fused[im_id - 1], &fused[im_id]);
         assert_eq!(
@@ -228,11 +208,9 @@ fn images_without_the_object_move_the_pose_with_the_camera() {
     assert_improved(&pose_of(&fused[6]), &truths[6]);
 
     // A damaged image has no estimate and is reported. The lines of the other images are written.
-    fs::write(scene_dir.join("depth/000005.png"), "no image").unwrap();
-    sequence(folder, INITIAL, "")
-        .exits(1)
-        .complains(&["000005.png", "1 files could not be used"]);
-    let damaged = lines(folder);
+    folder.write(scene_dir.join("depth/000005.png"), "no image");
+    sequence(&folder, INITIAL, "").fails(&["000005.png", "1 files could not be used"]);
+    let damaged = lines(&folder);
     assert_eq!(
         (damaged.len(), &damaged[5]["outcome"]),
         (IMAGES, &"moved".into())
@@ -243,52 +221,40 @@ fn images_without_the_object_move_the_pose_with_the_camera() {
 #[test]
 fn missing_inputs_are_named() {
     let folder = cars();
-    let folder = folder.path();
     let refused = |init: &str, options: &str, parts: &[&str]| {
-        sequence(folder, init, options).exits(1).complains(parts);
-        assert!(!folder.join("out.jsonl").exists());
+        sequence(&folder, init, options).fails(parts);
+        assert!(!folder.path("out.jsonl").exists());
     };
     refused(INITIAL, "--first 99", &["--first 99", "scene_camera.json"]);
     refused("none.json", "", &["none.json"]);
     let words = SEQUENCE.replace("--object 1", "--object 8");
-    let other = run(folder, words.split(' ').chain([INITIAL]));
-    other
-        .exits(1)
-        .complains(&["--object 8", "scene_gt.json: 1"]);
-    fs::write(
-        folder.join("other.csv"),
-        "scene_id,im_id,obj_id,score,R,t,time\n",
-    )
-    .unwrap();
+    let other = folder.command(format!("{words} {INITIAL}"));
+    other.fails(&["--object 8", "scene_gt.json: 1"]);
+    folder.write("other.csv", "scene_id,im_id,obj_id,score,R,t,time\n");
     refused(
         "other.csv",
         "",
         &["other.csv", "scene 1, image 0, object 1", "--first"],
     );
-    sequence(folder, INITIAL, "--fuser best")
-        .exits(2)
-        .complains(&["best", "most-confident"]);
+    sequence(&folder, INITIAL, "--fuser best").refuses(&["best", "most-confident"]);
 
-    let cameras = folder.join("set/test/000001/scene_camera.json");
-    let text = fs::read_to_string(&cameras).unwrap();
-    let mut value: Value = serde_json::from_str(&text).unwrap();
-    value["3"].as_object_mut().unwrap().remove("cam_t_w2c");
-    fs::write(&cameras, value.to_string()).unwrap();
-    refused(INITIAL, "", &["scene_camera.json", "$.3", "cam_t_w2c"]);
-    value["3"].as_object_mut().unwrap().remove("cam_R_w2c");
-    fs::write(&cameras, value.to_string()).unwrap();
-    refused(INITIAL, "", &["scene_camera.json", "$.3", "cam_R_w2c"]);
+    for key in ["cam_t_w2c", "cam_R_w2c"] {
+        folder.change_json(CAMERAS, |value| {
+            value["3"].as_object_mut().unwrap().remove(key);
+        });
+        refused(INITIAL, "", &["scene_camera.json", "$.3", key]);
+    }
     // If the sequence starts after that image, the camera pose is not required.
-    let pose = pose_json(&followed(folder).1[4]);
-    fs::write(folder.join("init.json"), pose.to_string()).unwrap();
-    sequence(folder, "init.json", "--first 4").exits(0);
-    let of_json = lines(folder);
+    let pose = pose_json(&followed(&folder).1[4]);
+    folder.write("init.json", pose.to_string());
+    sequence(&folder, "init.json", "--first 4").exits(0);
+    let of_json = lines(&folder);
     assert_eq!(of_json.len(), 3);
-    let pose = followed(folder).1[4];
+    let pose = followed(&folder).1[4];
     let (t, q) = (1e3 * pose.translation.vector, pose.rotation.coords);
     let text = format!("{} {} {} {} {} {} {}", t.x, t.y, t.z, q.x, q.y, q.z, q.w);
-    fs::write(folder.join("init.txt"), text).unwrap();
-    sequence(folder, "init.txt", "--first 4 --init-unit mm").exits(0);
-    let apart = off(&pose_of(&lines(folder)[2]), &pose_of(&of_json[2]));
+    folder.write("init.txt", text);
+    sequence(&folder, "init.txt", "--first 4 --init-unit mm").exits(0);
+    let apart = off(&pose_of(&lines(&folder)[2]), &pose_of(&of_json[2]));
     assert!(apart.0 < 1e-6 && apart.1 < 1e-6, "{apart:?}");
 }

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::common::*;
-use crate::world::*;
-use hicp_io::bop::{ResultRow, Rle, write_results};
+use hicp_io::bop::{ResultRow, write_results};
 use hybrid_icp::core::Isometry3;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 const AFTER: [u8; 3] = [86, 180, 233];
 const BEFORE: [u8; 3] = [230, 159, 0];
@@ -30,10 +29,7 @@ fn dataset() -> World {
 #[track_caller]
 fn show(world: &World, options: &str) -> Run {
     let fixed = "bop show --dataset . --scene 3 --image 40 --out show.png";
-    run(
-        world.folder.path(),
-        fixed.split(' ').chain(options.split(' ')),
-    )
+    world.command(format!("{fixed} {options}"))
 }
 
 /// Returns the printed cells by the object's tag.
@@ -79,8 +75,8 @@ fn outlines_of_both_files_with_the_errors_of_eval() {
 
     // The errors are those of bop eval.
     let words = "bop eval --dataset . --results off.csv --errors errors.csv";
-    run(world.folder.path(), words.split(' ')).exits(0);
-    let errors = std::fs::read_to_string(world.path("errors.csv")).unwrap();
+    world.command(words).exits(0);
+    let errors = world.read("errors.csv");
     let mut expected: Vec<(String, String)> = Vec::new();
     let mut least: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
     for line in errors.lines().skip(1) {
@@ -115,9 +111,9 @@ fn outlines_of_both_files_with_the_errors_of_eval() {
     let legend = &pixels[640 * 240..];
     assert!(count(legend, AFTER) > count(legend, BEFORE) && count(legend, BEFORE) > 20);
 
-    let bytes = std::fs::read(world.path("show.png")).unwrap();
+    let bytes = world.bytes("show.png");
     show(&world, "--results truth.csv --against off.csv").exits(0);
-    assert_eq!(std::fs::read(world.path("show.png")).unwrap(), bytes);
+    assert_eq!(world.bytes("show.png"), bytes);
 
     // With one file, there is one color.
     show(&world, "--results truth.csv").exits(0);
@@ -130,7 +126,7 @@ fn outlines_of_both_files_with_the_errors_of_eval() {
 fn the_color_image_is_the_background_if_it_can_be_read() {
     let world = dataset();
     let folder = world.scene(3).join("rgb");
-    std::fs::create_dir(&folder).unwrap();
+    world.create_dir(&folder);
     let path = folder.join("000040.png");
     let green = [20, 120, 40];
     hicp_io::write_rgb_png(&path, 320, 240, &green.repeat(320 * 240)).unwrap();
@@ -152,36 +148,20 @@ fn the_color_image_is_the_background_if_it_can_be_read() {
 
     hicp_io::write_rgb_png(&path, 4, 3, &green.repeat(12)).unwrap();
     show(&world, "--results off.csv")
-        .exits(1)
-        .complains(&["rgb/000040.png is 4x3 pixels, expected 320x240 as the depth image"]);
-    std::fs::write(&path, "no picture").unwrap();
-    show(&world, "--results off.csv")
-        .exits(1)
-        .complains(&["rgb/000040.png"]);
+        .fails(&["rgb/000040.png is 4x3 pixels, expected 320x240 as the depth image"]);
+    world.write(&path, "no picture");
+    show(&world, "--results off.csv").fails(&["rgb/000040.png"]);
     std::fs::rename(&path, folder.join("000040.jpg")).unwrap();
-    show(&world, "--results off.csv")
-        .exits(1)
-        .complains(&["rgb/000040.jpg"]);
+    show(&world, "--results off.csv").fails(&["rgb/000040.jpg"]);
 }
 
 #[test]
 fn without_ground_truth_there_is_the_mve_of_detections() {
     let world = dataset();
-    let mut detections = Vec::new();
-    for (instance, (id, _)) in world.truths[&FRAME].iter().enumerate() {
-        let mask = hicp_io::read_mask_png(world.mask_path(FRAME.0, FRAME.1, instance)).unwrap();
-        detections.push(json!({
-            "scene_id": FRAME.0, "image_id": FRAME.1, "category_id": id, "score": 0.9,
-            "segmentation": {"size": [240, 320], "counts": Rle::of_mask(&mask).counts()},
-        }));
-    }
-    std::fs::write(
-        world.path("found.json"),
-        Value::from(detections).to_string(),
-    )
-    .unwrap();
+    let detections = Value::from(world.detections(|_| false));
+    world.write("found.json", detections.to_string());
     let known = cells(&show(&world, "--results off.csv --top 2").exits(0));
-    std::fs::remove_file(world.scene(3).join("scene_gt.json")).unwrap();
+    world.remove(world.scene(3).join("scene_gt.json"));
     let told = show(&world, "--results off.csv").exits(0);
     // One estimate per object is shown, because the number of cars is unknown.
     let told = told.complains(&["warning: off.csv: 1 estimates", "--top"]);
@@ -229,7 +209,7 @@ fn objects_without_an_estimate_are_reported() {
 fn images_that_cannot_be_shown_are_refused() {
     let world = dataset();
     let fails = |options: &str, parts: &[&str]| {
-        let told = show(&world, options).exits(1).complains(parts);
+        let told = show(&world, options).fails(parts);
         assert_eq!(told.out, "");
         assert!(!world.path("show.png").exists());
     };
@@ -254,27 +234,25 @@ fn images_that_cannot_be_shown_are_refused() {
         "--results off.csv --split tset",
         &["split is missing", "tset"],
     );
-    std::fs::write(world.path("found.json"), "[7]").unwrap();
+    world.write("found.json", "[7]");
     fails(
         "--results off.csv --detections found.json",
         &["found.json, $[0]"],
     );
     let depth = world.depth_path(3, 40);
-    let whole = std::fs::read(&depth).unwrap();
-    std::fs::remove_file(&depth).unwrap();
+    let whole = world.bytes(&depth);
+    world.remove(&depth);
     fails(
         "--results off.csv",
         &["000003/depth/000040.png does not exist"],
     );
-    std::fs::write(&depth, &whole[..whole.len() / 3]).unwrap();
+    world.write(&depth, &whole[..whole.len() / 3]);
     fails("--results off.csv", &["000003/depth/000040.png"]);
-    std::fs::write(&depth, whole).unwrap();
+    world.write(&depth, whole);
 
     let named = |words: &str, code: i32, parts: &[&str]| {
         let words = format!("bop show --dataset . --results off.csv {words}");
-        run(world.folder.path(), words.split(' '))
-            .exits(code)
-            .complains(parts);
+        world.command(words).exits(code).complains(parts);
     };
     named(
         "--scene 9 --image 40 --out a.png",
@@ -300,8 +278,8 @@ fn images_that_cannot_be_shown_are_refused() {
 
     // A damaged mask removes only its MVE.
     let mask = world.mask_path(3, 40, 1);
-    let whole = std::fs::read(&mask).unwrap();
-    std::fs::write(&mask, &whole[..whole.len() / 3]).unwrap();
+    let whole = world.bytes(&mask);
+    world.write(&mask, &whole[..whole.len() / 3]);
     let told = show(&world, "--results truth.csv").exits(1);
     let told = told.complains(&["mask_visib/000040_000001.png", "1 files could not be used"]);
     let found = cells(&told);

@@ -1,53 +1,35 @@
 //! `hybrid-icp bop track` on generated scenes with moving objects.
 
-use std::fs;
-use std::path::Path;
-
 use crate::common::*;
 use hicp_io::bop::{Dataset, read_results};
 use hybrid_icp::core::se3;
-use serde_json::Value;
 
 const TRACK: &str = "bop track --dataset set --scene 1 --object 1 --output out.jsonl --init set/initial_synthetic-test.csv";
 
-fn moving(images: u32) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
+fn moving(images: u32) -> Folder {
+    let folder = Folder::new();
     let words = format!(
         "bop generate --scenes 1 --images {images} --instances 3 --seed 6 --moving --out set"
     );
-    run(folder.path(), words.split(' ')).exits(0);
+    folder.command(words).exits(0);
     folder
-}
-
-fn lines(folder: &Path) -> Vec<Value> {
-    let text = fs::read_to_string(folder.join("out.jsonl")).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
 }
 
 #[test]
 fn a_moving_mug_is_tracked_in_a_generated_scene() {
     let folder = moving(12);
-    let folder = folder.path();
-    let told = run(folder, format!("{TRACK} --results out.csv").split(' ')).exits(0);
-    assert!(
-        told.out.contains("12 images of scene 1, object 1"),
-        "{}",
-        told.out
-    );
-    assert!(
-        told.out.contains("tracking") && told.out.contains("ms"),
-        "{}",
-        told.out
-    );
-    let scene = Dataset::open(folder.join("set"))
+    let told = folder
+        .command(format!("{TRACK} --results out.csv"))
+        .exits(0);
+    let parts = ["12 images of scene 1, object 1", "tracking", "ms"];
+    told.prints(&parts);
+    let scene = Dataset::open(folder.path("set"))
         .unwrap()
         .scene("test", 1)
         .unwrap();
     let truth = |image| scene.ground_truth(image).unwrap()[0].camera_from_object;
     assert!(se3::pose_distance(&truth(0), &truth(11)).1 > 0.01);
-    let lines = lines(folder);
+    let lines = folder.json_lines("out.jsonl");
     assert_eq!(lines.len(), 12);
     for (image, line) in (0..).zip(&lines) {
         assert_eq!(
@@ -65,34 +47,27 @@ fn a_moving_mug_is_tracked_in_a_generated_scene() {
                 "{line}"
             ),
         }
-        let shares = &line["evidence"];
-        assert!(
-            (0.0..=1.0).contains(&shares["agrees"].as_f64().unwrap()),
-            "{line}"
-        );
-        assert!(
-            (0.0..=1.0).contains(&line["score"].as_f64().unwrap()),
-            "{line}"
-        );
+        for share in [&line["evidence"]["agrees"], &line["score"]] {
+            assert!((0.0..=1.0).contains(&share.as_f64().unwrap()), "{line}");
+        }
         assert!(line["time"].as_f64().unwrap() > 0.0);
     }
     let seen = lines.iter().filter(|line| line["state"] != "lost").count();
-    assert_eq!(read_results(folder.join("out.csv")).unwrap().len(), seen);
+    assert_eq!(read_results(folder.path("out.csv")).unwrap().len(), seen);
 }
 
 #[test]
 fn images_that_cannot_be_read_are_reported_and_have_a_predicted_pose() {
     let folder = moving(4);
-    let folder = folder.path();
-    fs::remove_file(folder.join("set/test/000001/depth/000002.png")).unwrap();
-    let depth = folder.join("set/test/000001/depth/000002.png");
+    let depth = "set/test/000001/depth/000002.png";
+    folder.remove(depth);
     for (damage, code) in [(None, 0), (Some("no image"), 1)] {
         if let Some(text) = damage {
-            fs::write(&depth, text).unwrap();
+            folder.write(depth, text);
         }
-        let told = run(folder, TRACK.split(' ')).exits(code);
-        assert!(told.err.contains("000002.png"), "{}", told.err);
-        let lines = lines(folder);
+        let told = folder.command(TRACK).exits(code);
+        assert_contains(&told.err, &["000002.png"]);
+        let lines = folder.json_lines("out.jsonl");
         assert_eq!(lines.len(), 4);
         assert_ne!(lines[2]["state"], "tracking");
     }
@@ -101,11 +76,11 @@ fn images_that_cannot_be_read_are_reported_and_have_a_predicted_pose() {
 #[test]
 fn a_start_far_from_the_object_is_warned_of() {
     let folder = moving(2);
-    let init = read_results(folder.path().join("set/initial_synthetic-test.csv")).unwrap();
+    let init = read_results(folder.path("set/initial_synthetic-test.csv")).unwrap();
     let pose = pose_json(&init[0].camera_from_object());
-    fs::write(folder.path().join("init.json"), pose.to_string()).unwrap();
+    folder.write("init.json", pose.to_string());
     let words = TRACK.replace("set/initial_synthetic-test.csv", "init.json --init-unit m");
-    run(folder.path(), words.split(' ')).exits(0).complains(&[
+    folder.command(words).warns(&[
         "tracked in none of its 2 images",
         "check init.json, and --init-unit",
     ]);
@@ -121,7 +96,7 @@ fn wrong_inputs_of_tracking_are_refused() {
         ("--init-unit m", "result files are in mm"),
     ] {
         let words = format!("{TRACK} {options}");
-        let told = run(folder.path(), words.split(' '));
+        let told = folder.command(words);
         assert!(told.err.contains(expected), "{options}: {}", told.err);
         assert_ne!(told.code, 0, "{options}");
     }

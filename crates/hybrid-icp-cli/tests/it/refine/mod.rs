@@ -1,5 +1,9 @@
-//! `hybrid-icp refine` on valid inputs.
+//! `hybrid-icp refine` on valid inputs; below, its errors and results, `estimate` and `doctor`.
 
+mod color;
+mod doctor;
+mod estimate;
+mod other_formats;
 mod refusals;
 mod results;
 
@@ -90,8 +94,8 @@ fn assert_kept(scene: &Scene, reason: &str) {
     let result = scene.result();
     assert_eq!(result["outcome"], "kept_initial", "{result}");
     let text = result["reason"].as_str().unwrap();
-    assert!(text.contains(reason), "{text}");
-    let init = std::fs::read_to_string(scene.path("init.json")).unwrap();
+    assert_contains(&text, &[reason]);
+    let init = scene.read("init.json");
     let init: Value = serde_json::from_str(&init).unwrap();
     for key in ["cam_R_m2c", "cam_t_m2c"] {
         let numbers = |value: &Value| -> Vec<u64> {
@@ -161,7 +165,7 @@ fn warnings_follow_the_mve_of_an_object_out_of_view() {
 #[test]
 fn units_that_do_not_match_are_warned_of() {
     let warned = |scene: &Scene, parts: &[&str]| {
-        scene.run().exits(0).complains(parts);
+        scene.run().warns(parts);
     };
     warned(
         &Scene::new().with("--depth-scale", "100"),
@@ -214,21 +218,21 @@ fn names_that_are_not_utf_8_are_accepted() {
     use std::os::unix::ffi::OsStrExt;
     let name = |bytes: &[u8]| std::ffi::OsStr::from_bytes(bytes).to_owned();
     let scene = Scene::new();
-    let odd = scene.folder.path().join(name(b"m\xff.ply"));
+    let odd = scene.root().join(name(b"m\xff.ply"));
     std::fs::rename(scene.path("mesh.ply"), odd).unwrap();
     let scene = scene
         .with("--model", name(b"m\xff.ply"))
         .with("--output", name(b"o\xfe.json"))
         .with("--overlay", name(b"\xfd.png"));
     scene.run().exits(0);
-    assert!(scene.folder.path().join(name(b"o\xfe.json")).is_file());
+    assert!(scene.root().join(name(b"o\xfe.json")).is_file());
     // Only a trace stores the names of its inputs as text; its own name may be any.
     let scene = scene.with("--trace", "trace.jsonl");
     let told = scene.run().exits(1);
     assert_eq!(told.out, "");
     told.complains(&["--model names m\u{fffd}.ply", "not UTF-8", "--trace"]);
     assert!(!scene.path("trace.jsonl").exists());
-    let odd = scene.folder.path().join(name(b"m\xff.ply"));
+    let odd = scene.root().join(name(b"m\xff.ply"));
     std::fs::copy(odd, scene.path("mesh.ply")).unwrap();
     let scene = scene
         .with("--model", "mesh.ply")
@@ -238,6 +242,5 @@ fn names_that_are_not_utf_8_are_accepted() {
     scene
         .with("--init", name(b"no\xff.json"))
         .run()
-        .exits(1)
-        .complains(&["cannot read no"]);
+        .fails(&["cannot read no"]);
 }

@@ -2,7 +2,6 @@
 //! expectation.
 
 use crate::common::*;
-use hicp_io::LengthUnit;
 use hybrid_icp::core::{DepthImage, Mask};
 
 /// Asserts that a scene is refused with all of these texts and that existing outputs are kept.
@@ -16,15 +15,15 @@ fn refused(scene: Scene, parts: &[&str]) {
     for name in ["out.json", "overlay.png"] {
         scene.write(name, "the user's");
     }
-    let before = names(scene.folder.path());
-    let told = scene.run().exits(1).complains(parts);
+    let before = scene.names("");
+    let told = scene.run().fails(parts);
     assert!(told.err.starts_with("error: "), "{}", told.err);
     assert_eq!(told.err.lines().count(), 1, "{}", told.err);
     assert_eq!(told.out, "");
     for name in ["out.json", "overlay.png"] {
-        assert_eq!(std::fs::read(scene.path(name)).unwrap(), b"the user's");
+        assert_eq!(scene.bytes(name), b"the user's");
     }
-    assert_eq!(names(scene.folder.path()), before, "nothing is left behind");
+    assert_eq!(scene.names(""), before, "nothing is left behind");
 }
 
 #[track_caller]
@@ -89,7 +88,7 @@ fn sizes_that_disagree_name_both_files_and_sizes() {
 #[test]
 fn images() {
     let scene = Scene::new();
-    let whole = std::fs::read(scene.path("depth.png")).unwrap();
+    let whole = scene.bytes("depth.png");
     scene.write("depth.png", &whole[..whole.len() / 2]);
     refused(scene, &["depth.png", "PNG"]);
     let scene = Scene::new();
@@ -146,26 +145,19 @@ fn outputs_are_checked_before_anything_is_read() {
         );
         for input in ["mesh.ply", "depth.png", "mask.png", "camera.json"] {
             let scene = Scene::new().with(option, format!("./{input}"));
-            let content = std::fs::read(scene.path(input)).unwrap();
+            let content = scene.bytes(input);
             let path = scene.path(input);
-            let told = scene
-                .run()
-                .exits(1)
-                .complains(&[option, input, "overwritten"]);
+            let told = scene.run().fails(&[option, input, "overwritten"]);
             assert_eq!(told.out, "");
             assert_eq!(std::fs::read(path).unwrap(), content);
         }
     }
     let scene = Scene::new().with("--overlay", "init.json");
-    scene
-        .run()
-        .exits(1)
-        .complains(&["--overlay", "--init", "init.json"]);
+    scene.run().fails(&["--overlay", "--init", "init.json"]);
     let scene = Scene::new().with("--output", "x").with("--overlay", "./x");
     scene
         .run()
-        .exits(1)
-        .complains(&["--output", "--overlay", "different files"]);
+        .fails(&["--output", "--overlay", "different files"]);
     assert!(!scene.path("x").exists());
     // The path of the folder is a file.
     refused(
@@ -178,8 +170,7 @@ fn outputs_are_checked_before_anything_is_read() {
 fn a_result_replaces_an_older_one_and_leaves_no_other_file() {
     let scene = Scene::new();
     scene.write("out.json", "older");
-    let before = names(scene.folder.path());
+    let before = scene.names("");
     scene.result();
-    assert_eq!(names(scene.folder.path()), before);
-    hicp_io::write_ply(scene.path("mesh.ply"), &car(), LengthUnit::Meters).unwrap();
+    assert_eq!(scene.names(""), before);
 }

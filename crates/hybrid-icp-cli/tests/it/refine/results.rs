@@ -78,7 +78,7 @@ fn without_an_output_the_json_is_printed_alone() {
     let scene = Scene::new();
     let mut written = scene.result();
     let printed = scene.without("--output").run().exits(0);
-    let mut printed: Value = serde_json::from_str(&printed.out).unwrap();
+    let mut printed = printed.json();
     for result in [&mut written, &mut printed] {
         result["time_ms"] = Value::Null;
     }
@@ -92,11 +92,7 @@ fn every_line_of_a_trace_can_be_the_start_of_another_run() {
         .with("--trace", "trace.jsonl")
         .with("--pipeline", "hybrid");
     let result = scene.result();
-    let text = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
-    let lines: Vec<Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let lines = scene.json_lines("trace.jsonl");
     let of = |event: &str| {
         lines
             .iter()
@@ -121,9 +117,8 @@ fn every_line_of_a_trace_can_be_the_start_of_another_run() {
 #[test]
 fn the_result_has_every_warning() {
     let told = |scene: &Scene, parts: &[&str]| {
-        let run = scene.run().exits(0).complains(parts);
-        let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
-        let result: Value = serde_json::from_str(&text).unwrap();
+        let run = scene.run().warns(parts);
+        let result = scene.json("out.json");
         let warnings = result["warnings"].as_array().unwrap().iter();
         let lines = warnings.map(|text| format!("warning: {}\n", text.as_str().unwrap()));
         assert_eq!(lines.collect::<String>(), run.err);
@@ -153,9 +148,9 @@ fn a_trace_is_replayed_to_the_last_digit() {
         .with("--trace", "trace.jsonl")
         .with("--set", "stage.stages.1.misaligned.stages.1.max_steps=2");
     scene.result();
-    let replay = || run(&scene.path(""), ["replay", "trace.jsonl"]);
+    let replay = || scene.command("replay trace.jsonl");
     let printed = replay().exits(0).out;
-    let text = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
+    let text = scene.read("trace.jsonl");
     assert!(printed.contains(&format!("{} lines, all equal", text.lines().count())));
     // A changed line is reported.
     let (number, line) = text
@@ -167,7 +162,7 @@ fn a_trace_is_replayed_to_the_last_digit() {
     changed["n_pairs"] = 1.into();
     scene.write("trace.jsonl", text.replace(line, &changed.to_string()));
     let complaint = format!("trace.jsonl:{} differs", number + 1);
-    replay().exits(1).complains(&[&complaint]);
+    replay().fails(&[&complaint]);
     // Other files are refused.
     for (content, expected) in [
         ("", "empty, expected a trace"),
@@ -183,7 +178,7 @@ fn a_trace_is_replayed_to_the_last_digit() {
         ),
     ] {
         scene.write("trace.jsonl", content);
-        replay().exits(1).complains(&[expected]);
+        replay().fails(&[expected]);
     }
 }
 
@@ -191,8 +186,7 @@ fn a_trace_is_replayed_to_the_last_digit() {
 fn a_pose_can_be_refined_in_place() {
     let scene = Scene::new().with("--output", "./init.json");
     scene.run().exits(0);
-    let text = std::fs::read_to_string(scene.path("init.json")).unwrap();
-    assert_improved(&pose_of(&serde_json::from_str(&text).unwrap()), &truth());
+    assert_improved(&pose_of(&scene.json("init.json")), &truth());
     // The result can be refined again.
     scene.run().exits(0);
 }
@@ -205,13 +199,13 @@ fn other_poses_that_a_search_finds_are_written() {
     let always = hybrid_icp::Preset::Search.toml();
     let limit = "good_enough = 0.005\n";
     let always = always.replace(limit, "good_enough = 0.0\nstart = \"ignored\"\n");
-    std::fs::write(scene.path("always.toml"), always).unwrap();
+    scene.write("always.toml", always);
     scene.run().exits(0);
-    let text = std::fs::read_to_string(scene.path("others.json")).unwrap();
-    let others: Vec<Value> = serde_json::from_str(&text).unwrap();
+    let others = scene.json("others.json");
+    let others = others.as_array().unwrap();
     assert!(!others.is_empty());
     let mut last = 0.0;
-    for other in &others {
+    for other in others {
         let number = |key: &str| other[key].as_f64().unwrap();
         assert!(number("score") >= last && number("mssd_mm") > 1.0);
         assert!(number("gap") <= number("score") && number("rotation_degrees") > 0.0);

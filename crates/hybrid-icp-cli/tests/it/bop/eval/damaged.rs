@@ -8,13 +8,13 @@ fn a_stated_diameter_that_differs_from_the_mesh_is_warned_of() {
     let world = dataset();
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
     let info = json!({"1": {"diameter": 1500.0}}).to_string();
-    std::fs::write(world.path("models/models_info.json"), info).unwrap();
-    let run = eval(&world, &[]).exits(0).complains(&[
+    world.write("models/models_info.json", info);
+    let run = eval(&world, "").warns(&[
         "models_info.json: object 1: the stated diameter is 1.5000 m, but that of the mesh is 0.1",
         "check both, because poses, the MVE and recalls depend on it",
     ]);
     assert_eq!(run.err.lines().count(), 1, "{}", run.err);
-    let warnings = &read_json(&world)["warnings"];
+    let warnings = &world.json("out.json")["warnings"];
     assert_eq!(
         run.err,
         format!("warning: {}\n", warnings[0].as_str().unwrap())
@@ -29,12 +29,15 @@ fn rows_and_targets_that_do_not_match_are_warned_of() {
     rows.push(ResultRow::new(3, 0, ABSENT, pose));
     rows.push(ResultRow::new(77, 0, CAR, pose));
     write_results(world.path("in.csv"), &rows).unwrap();
-    eval(&world, &[]).exits(0).complains(&[
+    eval(&world, "").warns(&[
         "warning: in.csv: 2 of 12 rows have no target",
         "object 9 in image 0 of scene 3",
     ]);
-    assert_eq!(recalls(&read_json(&world)), [1.0; 5]);
-    assert_eq!(read_json(&world)["warnings"].as_array().unwrap().len(), 1);
+    assert_eq!(recalls(&world.json("out.json")), [1.0; 5]);
+    assert_eq!(
+        world.json("out.json")["warnings"].as_array().unwrap().len(),
+        1
+    );
 
     // The targets name an object without a model, more instances than exist, and a missing image.
     let asked = |scene: u32, image: u32, object: u32, count: u32| json!({"scene_id": scene, "im_id": image, "obj_id": object, "inst_count": count});
@@ -44,24 +47,18 @@ fn rows_and_targets_that_do_not_match_are_warned_of() {
         asked(3, 7, CAR, 2),
         asked(55, 0, CAR, 4)
     ]);
-    std::fs::write(world.path("asked.json"), targets.to_string()).unwrap();
+    world.write("asked.json", targets.to_string());
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
-    let run = eval(&world, &["--targets", "asked.json"])
-        .exits(0)
-        .complains(&[
-            "no model for object 9",
-            "scene_gt.json",
-            "2 instances of object 1, but the targets request 3",
-            "8 of 10 rows have no target",
-            "scene_camera.json, $: found 2 images, expected image 7",
-            "and 1 more like it",
-        ]);
-    assert!(
-        run.out.contains("8 targets could not be evaluated"),
-        "{}",
-        run.out
-    );
-    let report = read_json(&world);
+    let run = eval(&world, "--targets asked.json").warns(&[
+        "no model for object 9",
+        "scene_gt.json",
+        "2 instances of object 1, but the targets request 3",
+        "8 of 10 rows have no target",
+        "scene_camera.json, $: found 2 images, expected image 7",
+        "and 1 more like it",
+    ]);
+    run.prints(&["8 targets could not be evaluated"]);
+    let report = world.json("out.json");
     assert_eq!(
         (&report["targets"], &report["left_out"]),
         (&json!(2), &json!(8))
@@ -70,9 +67,7 @@ fn rows_and_targets_that_do_not_match_are_warned_of() {
 
     // Masks are not required here, but masks of another size indicate wrong files.
     hicp_io::write_mask_png(world.mask_path(3, 0, 1), &Mask::full(32, 24)).unwrap();
-    eval(&world, &[])
-        .exits(0)
-        .complains(&["000000_000001.png is 32x24", "expected 320x240"]);
+    eval(&world, "").warns(&["000000_000001.png is 32x24", "expected 320x240"]);
 }
 
 #[test]
@@ -84,43 +79,37 @@ fn translations_in_meters_are_warned_of() {
         ResultRow::new(row.scene_id, row.im_id, row.obj_id, pose)
     });
     write_results(world.path("in.csv"), &in_meters.collect::<Vec<_>>()).unwrap();
-    let told = eval(&world, &[]).exits(0).err;
-    assert!(
-        told.contains("in.csv: all translations are below 20 mm"),
-        "{told}"
-    );
+    let told = eval(&world, "").exits(0).err;
+    assert_contains(&told, &["in.csv: all translations are below 20 mm"]);
 }
 
 #[test]
 fn without_targets_every_visible_instance_is_a_target() {
     let world = dataset();
-    std::fs::remove_file(world.path("test_targets_bop19.json")).unwrap();
+    world.remove("test_targets_bop19.json");
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
-    eval(&world, &[])
-        .exits(0)
-        .complains(&["warning: ", "test_targets_bop19.json does not exist"]);
-    assert_eq!(read_json(&world)["targets"], json!(10));
+    eval(&world, "").warns(&["warning: ", "test_targets_bop19.json does not exist"]);
+    assert_eq!(world.json("out.json")["targets"], json!(10));
 
     // Those of the test images are not about another split, even if its numbers are the same.
     let targets = r#"[{"scene_id": 3, "im_id": 0, "obj_id": 1, "inst_count": 1}]"#;
-    std::fs::write(world.path("test_targets_bop19.json"), targets).unwrap();
-    eval(&world, &[]).exits(0);
-    assert_eq!(read_json(&world)["targets"], json!(1));
+    world.write("test_targets_bop19.json", targets);
+    eval(&world, "").exits(0);
+    assert_eq!(world.json("out.json")["targets"], json!(1));
     std::fs::rename(world.path("test"), world.path("val")).unwrap();
-    eval(&world, &["--split", "val"])
-        .exits(0)
-        .complains(&["test_targets_bop19.json is not about the split val: every instance"]);
-    assert_eq!(read_json(&world)["targets"], json!(10));
+    eval(&world, "--split val")
+        .warns(&["test_targets_bop19.json is not about the split val: every instance"]);
+    assert_eq!(world.json("out.json")["targets"], json!(10));
     std::fs::rename(world.path("val"), world.path("test")).unwrap();
-    std::fs::remove_file(world.path("test_targets_bop19.json")).unwrap();
+    world.remove("test_targets_bop19.json");
 
     // Of two cars, only the more visible one is a target; the other is visible by less than a
     // tenth.
     let visible = |a: f64, b: f64| json!([{"visib_fract": a}, {"visib_fract": b}]);
     let info = json!({"0": visible(0.05, 0.9)});
-    std::fs::write(world.scene(3).join("scene_gt_info.json"), info.to_string()).unwrap();
-    eval(&world, &[]).exits(0);
-    let report = read_json(&world);
+    world.write(world.scene(3).join("scene_gt_info.json"), info.to_string());
+    eval(&world, "").exits(0);
+    let report = world.json("out.json");
     assert_eq!(report["targets"], json!(9));
     // Rows are in the inverse order of the ground truth, so the first row is the visible car.
     assert_eq!(recalls(&report), [1.0; 5]);
@@ -138,12 +127,12 @@ fn damaged_files_are_reported_and_the_rest_is_evaluated() {
     let small_path = world.path("small.png");
     hicp_io::write_depth_png(&small_path, &small, 0.1).unwrap();
     let replaced = |path: &std::path::Path, from: &str, to: &str| {
-        let text = std::fs::read_to_string(path).unwrap();
+        let text = world.read(path);
         assert!(text.contains(from), "no {from} in {text}");
         text.replacen(from, to, 1).into_bytes()
     };
     let depth = world.depth_path(3, 40);
-    let whole = std::fs::read(&depth).unwrap();
+    let whole = world.bytes(&depth);
     for (path, content, parts, left) in [
         (
             depth.clone(),
@@ -153,7 +142,7 @@ fn damaged_files_are_reported_and_the_rest_is_evaluated() {
         ),
         (
             depth,
-            std::fs::read(eight_bit).unwrap(),
+            world.bytes(eight_bit),
             &["000040.png: found 8-bit", "expected 16-bit"],
             7,
         ),
@@ -193,55 +182,47 @@ fn damaged_files_are_reported_and_the_rest_is_evaluated() {
             8,
         ),
     ] {
-        let before = std::fs::read(&path).unwrap();
-        std::fs::write(&path, content).unwrap();
-        let run = eval(&world, &[]).exits(1);
+        let before = world.bytes(&path);
+        world.write(&path, content);
+        let run = eval(&world, "").exits(1);
         let run = run
             .complains(parts)
             .complains(&["error: 1 files could not be used"]);
-        let report = read_json(&world);
+        let report = world.json("out.json");
         assert_eq!(report["targets"], json!(left), "{}", run.err);
         assert_eq!(recalls(&report), [1.0; 5]);
-        assert!(
-            run.out
-                .contains(&format!("{} targets could not", 10 - left)),
-            "{}",
-            run.out
-        );
-        std::fs::write(&path, before).unwrap();
+        run.prints(&[&format!("{} targets could not", 10 - left)]);
+        world.write(&path, before);
     }
 
     // An image without depth counts as missing.
     let depth = world.depth_path(3, 0);
-    let whole = std::fs::read(&depth).unwrap();
-    std::fs::remove_file(&depth).unwrap();
-    eval(&world, &[]).exits(0).complains(&[
+    let whole = world.bytes(&depth);
+    world.remove(&depth);
+    eval(&world, "").warns(&[
         "warning: depth image is missing",
         "000003/depth/000000.png does not exist",
     ]);
-    assert_eq!(read_json(&world)["left_out"], json!(2));
+    assert_eq!(world.json("out.json")["left_out"], json!(2));
     // A scene without ground truth is reported once.
     let scene_gt = world.scene(3).join("scene_gt.json");
     std::fs::rename(&scene_gt, world.path("aside.json")).unwrap();
-    let run = eval(&world, &[]).exits(0);
+    let run = eval(&world, "").exits(0);
     assert_eq!(run.err.matches("scene_gt.json").count(), 1, "{}", run.err);
-    assert!(run.err.contains("ground truth is missing"), "{}", run.err);
+    assert_contains(&run.err, &["ground truth is missing"]);
     std::fs::rename(world.path("aside.json"), scene_gt).unwrap();
     // A depth image of the wrong size does not match its masks.
     std::fs::copy(small_path, &depth).unwrap();
-    eval(&world, &[])
-        .exits(0)
-        .complains(&["000000_000000.png is 320x240 pixels, expected 4x3 as the depth image"]);
-    std::fs::write(&depth, whole).unwrap();
+    eval(&world, "")
+        .warns(&["000000_000000.png is 320x240 pixels, expected 4x3 as the depth image"]);
+    world.write(&depth, whole);
 
-    std::fs::write(
-        world.path("models/models_info.json"),
+    world.write(
+        "models/models_info.json",
         r#"{"1": {"diameter": 100, "symmetries_discrete": 3}}"#,
-    )
-    .unwrap();
-    eval(&world, &[])
-        .exits(1)
-        .complains(&["models_info.json, $.1.symmetries_discrete: found 3, expected an array"]);
+    );
+    eval(&world, "")
+        .fails(&["models_info.json, $.1.symmetries_discrete: found 3, expected an array"]);
 }
 
 #[test]
@@ -286,8 +267,8 @@ fn bad_results_and_targets_name_their_place() {
             &["line 2, column \"obj_id\"", "\"car\"", "integer"],
         ),
     ] {
-        std::fs::write(world.path("in.csv"), text).unwrap();
-        let run = eval(&world, &[]).exits(1).complains(parts);
+        world.write("in.csv", text);
+        let run = eval(&world, "").fails(parts);
         assert_eq!(run.out, "");
     }
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
@@ -309,35 +290,23 @@ fn bad_results_and_targets_name_their_place() {
         ),
         ("[NaN]".to_owned(), &["bad.json, line 1, column 2"]),
     ] {
-        std::fs::write(world.path("bad.json"), text).unwrap();
-        eval(&world, &["--targets", "bad.json"])
-            .exits(1)
-            .complains(parts);
+        world.write("bad.json", text);
+        eval(&world, "--targets bad.json").fails(parts);
     }
-    std::fs::write(
-        world.path("gone.json"),
+    world.write(
+        "gone.json",
         r#"[{"scene_id": 99, "im_id": 0, "obj_id": 1, "inst_count": 1}]"#,
-    )
-    .unwrap();
-    eval(&world, &["--targets", "gone.json"])
-        .exits(1)
-        .complains(&["in.csv: none of", "rows has a target", "--split"]);
+    );
+    eval(&world, "--targets gone.json").fails(&["in.csv: none of", "rows has a target", "--split"]);
     let mut rows = truth_as_results(&world);
     rows.iter_mut()
         .for_each(|row| (row.scene_id, row.im_id, row.obj_id) = (99, 0, 1));
     write_results(world.path("in.csv"), &rows[..1]).unwrap();
-    eval(&world, &["--targets", "gone.json"])
-        .exits(1)
-        .complains(&["none of the 1 targets could be evaluated", "--split"]);
-    eval(&world, &["--split", "tset"])
-        .exits(1)
-        .complains(&["split is missing", "tset"]);
-    eval(&world, &["--targets", "out.json"])
-        .exits(1)
-        .complains(&["--json", "--targets", "overwritten"]);
+    eval(&world, "--targets gone.json")
+        .fails(&["none of the 1 targets could be evaluated", "--split"]);
+    eval(&world, "--split tset").fails(&["split is missing", "tset"]);
+    eval(&world, "--targets out.json").fails(&["--json", "--targets", "overwritten"]);
     for delta in ["0", "-1", "nan"] {
-        eval(&world, &[&format!("--delta={delta}")])
-            .exits(2)
-            .complains(&["above 0"]);
+        eval(&world, &format!("--delta={delta}")).refuses(&["above 0"]);
     }
 }

@@ -4,7 +4,6 @@ mod damaged;
 mod scores;
 
 use crate::common::*;
-use crate::world::*;
 use hicp_io::bop::{ResultRow, write_results};
 use hybrid_icp::core::{DepthImage, Isometry3, Mask, Vector3};
 use serde_json::{Value, json};
@@ -24,11 +23,7 @@ fn dataset() -> World {
             }
         }
     }
-    std::fs::write(
-        world.path("test_targets_bop19.json"),
-        Value::from(targets).to_string(),
-    )
-    .unwrap();
+    world.write("test_targets_bop19.json", Value::from(targets).to_string());
     world
 }
 
@@ -44,26 +39,18 @@ fn truth_as_results(world: &World) -> Vec<ResultRow> {
 }
 
 #[track_caller]
-fn eval(world: &World, options: &[&str]) -> Run {
+fn eval(world: &World, options: &str) -> Run {
     let fixed = "bop eval --dataset . --results in.csv --json out.json --errors errors.csv";
-    run(
-        world.folder.path(),
-        fixed.split(' ').chain(options.iter().copied()),
-    )
+    world.command(format!("{fixed} {options}"))
 }
 
 /// Evaluates rows, asserts that there is no message, and returns the report.
 #[track_caller]
-fn report(world: &World, rows: &[ResultRow], options: &[&str]) -> Value {
+fn report(world: &World, rows: &[ResultRow], options: &str) -> Value {
     write_results(world.path("in.csv"), rows).unwrap();
     let run = eval(world, options).exits(0);
     assert_eq!(run.err, "");
-    read_json(world)
-}
-
-fn read_json(world: &World) -> Value {
-    let text = std::fs::read_to_string(world.path("out.json")).unwrap();
-    serde_json::from_str(&text).unwrap()
+    world.json("out.json")
 }
 
 /// Returns AR, AR_VSD, AR_MSSD, AR_MSPD and the recall of AD.

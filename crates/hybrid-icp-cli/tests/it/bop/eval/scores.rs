@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn the_truth_scores_one_on_every_metric() {
     let world = dataset();
-    let report = report(&world, &truth_as_results(&world), &[]);
+    let report = report(&world, &truth_as_results(&world), "");
     assert_eq!(recalls(&report), [1.0; 5]);
     assert_eq!(
         (&report["targets"], &report["missing"]),
@@ -18,7 +18,7 @@ fn the_truth_scores_one_on_every_metric() {
     }
 
     // Each image has two cars: both are compared with both instances, the hammer with itself.
-    let errors = std::fs::read_to_string(world.path("errors.csv")).unwrap();
+    let errors = world.read("errors.csv");
     assert_eq!(errors.lines().count(), 1 + 4 * 4 + 2);
     let columns = errors.lines().next().unwrap().split(',').count();
     for line in errors.lines().skip(1) {
@@ -26,7 +26,7 @@ fn the_truth_scores_one_on_every_metric() {
         assert_eq!(cells.len(), columns);
     }
 
-    let table = eval(&world, &[]).exits(0).out;
+    let table = eval(&world, "").exits(0).out;
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!(lines.len(), 5);
     assert!(lines[4].starts_with("recall of MSSD below 2 mm 1.000, 4 mm 1.000"));
@@ -41,15 +41,15 @@ fn the_truth_scores_one_on_every_metric() {
 fn neither_threads_nor_the_order_of_rows_change_a_byte() {
     let world = dataset();
     let mut rows = world.rows();
-    report(&world, &rows, &["--threads", "1"]);
-    let one = std::fs::read(world.path("errors.csv")).unwrap();
-    let recalls_of_one = read_json(&world);
-    report(&world, &rows, &["--threads", "3"]);
-    assert_eq!(std::fs::read(world.path("errors.csv")).unwrap(), one);
+    report(&world, &rows, "--threads 1");
+    let one = world.bytes("errors.csv");
+    let recalls_of_one = world.json("out.json");
+    report(&world, &rows, "--threads 3");
+    assert_eq!(world.bytes("errors.csv"), one);
     // Of two estimates with equal scores, the first is preferred, so only estimates of different
     // objects may be exchanged.
     rows.sort_by_key(|row| row.obj_id);
-    let sorted = report(&world, &rows, &[]);
+    let sorted = report(&world, &rows, "");
     assert_eq!(recalls(&sorted), recalls(&recalls_of_one));
 }
 
@@ -67,7 +67,7 @@ fn worse_estimates_have_lower_recalls_and_missing_ones_count() {
     };
     let mut before = 1.0 + f64::EPSILON;
     for mm in [2.0, 20.0, 60.0] {
-        let report = report(&world, &off(mm), &[]);
+        let report = report(&world, &off(mm), "");
         let ar = recalls(&report)[0];
         assert!(ar < before, "{mm} mm: {ar}");
         before = ar;
@@ -77,13 +77,13 @@ fn worse_estimates_have_lower_recalls_and_missing_ones_count() {
 
     // Half of the estimates are perfect, the others are missing.
     let half: Vec<_> = truth.iter().step_by(2).cloned().collect();
-    let found = report(&world, &half, &[]);
+    let found = report(&world, &half, "");
     assert_eq!(recalls(&found), [0.5; 5]);
     assert_eq!(
         (&found["targets"], &found["missing"]),
         (&json!(10), &json!(5))
     );
-    let none = report(&world, &[], &[]);
+    let none = report(&world, &[], "");
     assert_eq!(recalls(&none), [0.0; 5]);
     assert_eq!(
         (&none["missing"], &none["median_adi_mm"]),
@@ -104,19 +104,19 @@ fn a_symmetric_equivalent_scores_one_on_mssd_and_mspd() {
             "1": {"diameter": world.diameter_mm(CAR), "symmetries_discrete": symmetries},
             "2": {"diameter": world.diameter_mm(HAMMER), "symmetries_discrete": symmetries},
         });
-        std::fs::write(world.path("models/models_info.json"), objects.to_string()).unwrap();
+        world.write("models/models_info.json", objects.to_string());
     };
     info(&json!([]));
-    let declared_without = report(&world, &rows, &[]);
+    let declared_without = report(&world, &rows, "");
     assert!(recalls(&declared_without)[2] < 0.5);
     info(&json!([[-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]));
-    let declared = report(&world, &rows, &[]);
+    let declared = report(&world, &rows, "");
     let [_, _, mssd, mspd, _] = recalls(&declared);
     assert_eq!((mssd, mspd), (1.0, 1.0));
     // AD is ADI for objects with declared symmetries. These objects are not symmetric, so ADI
     // differs from both ADD and a perfect score.
-    let as_add = report(&world, &rows, &["--symmetric", "7"]);
-    let as_adi = report(&world, &rows, &["--symmetric", "1,2"]);
+    let as_add = report(&world, &rows, "--symmetric 7");
+    let as_adi = report(&world, &rows, "--symmetric 1,2");
     assert_eq!(as_adi, declared);
     assert!(recalls(&as_add)[4] <= recalls(&as_adi)[4]);
 }
@@ -134,17 +134,15 @@ fn only_the_best_scores_are_evaluated() {
     // There are ten perfect rows and ten bad ones. The bad ones come first and have lower scores.
     let together = [worse.clone(), rows.clone()].concat();
     write_results(world.path("in.csv"), &together).unwrap();
-    eval(&world, &[])
-        .exits(0)
-        .complains(&["warning: in.csv: 10 rows are ignored", "lowest scores"]);
-    assert_eq!(recalls(&read_json(&world)), [1.0; 5]);
+    eval(&world, "").warns(&["warning: in.csv: 10 rows are ignored", "lowest scores"]);
+    assert_eq!(recalls(&world.json("out.json")), [1.0; 5]);
 
     for row in &mut rows {
         row.score = 0.1;
     }
     write_results(world.path("in.csv"), &[worse, rows].concat()).unwrap();
-    eval(&world, &[]).exits(0);
-    assert_eq!(recalls(&read_json(&world))[2], 0.0);
+    eval(&world, "").exits(0);
+    assert_eq!(recalls(&world.json("out.json"))[2], 0.0);
 }
 
 #[test]
@@ -175,8 +173,8 @@ fn scores_are_compared_with_correctness() {
         &[&rows[..], &wrong, &strangers].concat(),
     )
     .unwrap();
-    let run = eval(&world, &["--calibration"]).exits(0);
-    let found = read_json(&world)["calibration"].clone();
+    let run = eval(&world, "--calibration").exits(0);
+    let found = world.json("out.json")["calibration"].clone();
     // Of 100 pairs, 81 are in order, 18 are ties, and one is in reverse.
     assert_eq!(found["roc_area"], json!(0.9));
     assert_eq!(
@@ -194,19 +192,17 @@ fn scores_are_compared_with_correctness() {
     };
     line(0.2, 0.1);
     line(0.9, 0.9);
-    for part in [
+    run.prints(&[
         "20 estimates, 10 correct, ROC area 0.900",
         "0.9-1.0         10",
         "score against MSSD < 0.1 d: ",
-    ] {
-        assert!(run.out.contains(part), "no {part:?} in {}", run.out);
-    }
+    ]);
 
     // If all are correct, there is nothing to rank.
     write_results(world.path("in.csv"), &rows).unwrap();
-    let run = eval(&world, &["--calibration"]).exits(0);
-    assert!(read_json(&world)["calibration"]["roc_area"].is_null());
-    assert!(run.out.contains("undefined"), "{}", run.out);
-    eval(&world, &[]).exits(0);
-    assert!(read_json(&world).get("calibration").is_none());
+    let run = eval(&world, "--calibration").exits(0);
+    assert!(world.json("out.json")["calibration"]["roc_area"].is_null());
+    run.prints(&["undefined"]);
+    eval(&world, "").exits(0);
+    assert!(world.json("out.json").get("calibration").is_none());
 }

@@ -1,29 +1,31 @@
 //! Color images and colored meshes.
 
+use hicp_io::LengthUnit;
 use hybrid_icp::core::TriMesh;
 
 use crate::common::*;
-use crate::world::World;
 
 /// Returns the text of a PLY file, red at one end and green at the other.
 fn colored(mesh: &TriMesh, units_per_meter: f32) -> String {
+    let (vertices, faces) = (mesh.vertices().len(), mesh.triangles().len());
     let mut text = format!(
-        "ply\nformat ascii 1.0\nelement vertex {}\n",
-        mesh.vertices().len()
+        "ply
+format ascii 1.0
+element vertex {vertices}
+\
+         property float x
+property float y
+property float z
+\
+         property uchar red
+property uchar green
+property uchar blue
+\
+         element face {faces}
+property list uchar int vertex_index
+end_header
+"
     );
-    let names = [
-        "float x",
-        "float y",
-        "float z",
-        "uchar red",
-        "uchar green",
-        "uchar blue",
-    ];
-    for name in names {
-        text += &format!("property {name}\n");
-    }
-    let faces = mesh.triangles().len();
-    text += &format!("element face {faces}\nproperty list uchar int vertex_index\nend_header\n");
     for p in mesh.vertices() {
         let color = if p.x > 0.0 { "250 0 0" } else { "0 250 0" };
         let p = p * units_per_meter;
@@ -47,16 +49,16 @@ fn a_color_image_is_used_with_a_colored_mesh_and_a_trace_repeats_it() {
         .with("--model", "colored.ply")
         .with("--trace", "trace.jsonl");
     scene.write("colored.ply", colored(&car(), 1.0));
-    let told = run(scene.folder.path(), ["inspect", "colored.ply"]).exits(0);
-    assert!(told.out.contains(", vertex colors\n"), "{}", told.out);
+    let told = scene.command("inspect colored.ply").exits(0);
+    told.prints(&[", vertex colors\n"]);
     write_gray(scene.path("rgb.png"), 320, 240);
     let result = scene.result();
     assert_improved(&pose_of(&result), &truth());
     assert_eq!(result["warnings"], serde_json::json!([]));
-    let trace = std::fs::read_to_string(scene.path("trace.jsonl")).unwrap();
+    let trace = scene.read("trace.jsonl");
     let header = trace.lines().next().unwrap();
-    assert!(header.contains(r#""rgb":"rgb.png""#), "{header}");
-    run(scene.folder.path(), ["replay", "trace.jsonl"]).exits(0);
+    assert_contains(&header, &[r#""rgb":"rgb.png""#]);
+    scene.command("replay trace.jsonl").exits(0);
 }
 
 #[test]
@@ -67,14 +69,11 @@ fn a_warning_says_why_a_color_image_is_ignored() {
         "warning: mesh.ply has no colors",
         "--rgb rgb.png is ignored",
     ];
-    scene.run().exits(0).complains(&parts);
+    scene.run().warns(&parts);
     let text = colored(&car(), 1.0).replacen("250 0 0", "250 none 0", 1);
     scene.write("colored.ply", text);
     let scene = scene.with("--model", "colored.ply");
-    scene
-        .run()
-        .exits(0)
-        .complains(&["a color that is not a number"]);
+    scene.run().warns(&["a color that is not a number"]);
 }
 
 #[test]
@@ -82,62 +81,50 @@ fn a_color_image_of_another_size_is_refused() {
     let scene = Scene::new().with("--rgb", "rgb.png");
     write_gray(scene.path("rgb.png"), 640, 480);
     let parts = ["rgb.png is 640x480", "320x240", "--depth-camera"];
-    scene.run().exits(1).complains(&parts);
+    scene.run().fails(&parts);
     scene.write("rgb.png", "not an image");
-    scene
-        .run()
-        .exits(1)
-        .complains(&["rgb.png", "PNG, JPEG or TIFF"]);
+    scene.run().fails(&["rgb.png", "PNG, JPEG or TIFF"]);
 }
 
 #[test]
 fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
     let world = World::new();
     let rows = world.rows();
-    let (_, depth_only) = world.refine(&rows, &[]);
-    std::fs::create_dir(world.path("models_color")).unwrap();
+    let (_, depth_only) = world.refine(&rows, "");
+    world.create_dir("models_color");
     for id in [1, 2] {
-        let name = format!("obj_{id:06}.ply");
-        let mesh = hicp_io::read_mesh(
-            world.path("models").join(&name),
-            hicp_io::LengthUnit::Millimeters,
-        );
-        let text = colored(&mesh.unwrap(), 1000.0);
-        std::fs::write(world.path("models_color").join(name), text).unwrap();
+        let path = world.path(format!("models/obj_{id:06}.ply"));
+        let mesh = hicp_io::read_mesh(path, LengthUnit::Millimeters).unwrap();
+        let name = format!("models_color/obj_{id:06}.ply");
+        world.write(name, colored(&mesh, 1000.0));
     }
     let info = r#"{"1": {"diameter": 0.5}, "2": {"diameter": 100}}"#;
-    std::fs::write(world.path("models/models_info.json"), info).unwrap();
-    let (warned, _) = world.refine(&rows, &["--models", "models_color"]);
-    warned
-        .exits(0)
-        .complains(&["models/models_info.json: object 1"]);
-    std::fs::remove_file(world.path("models/models_info.json")).unwrap();
+    world.write("models/models_info.json", info);
+    let (warned, _) = world.refine(&rows, "--models models_color");
+    warned.warns(&["models/models_info.json: object 1"]);
+    world.remove("models/models_info.json");
 
     let rgb = world.scene(3).join("rgb");
-    std::fs::create_dir(&rgb).unwrap();
-    std::fs::write(rgb.join("000040.png"), "damaged").unwrap();
-    let (damaged, _) = world.refine(&rows, &["--models", "models_color"]);
+    world.create_dir(&rgb);
+    world.write(rgb.join("000040.png"), "damaged");
+    let (damaged, _) = world.refine(&rows, "--models models_color");
+    let parts = ["rgb/000040.png", "PNG, JPEG or TIFF", "by depth alone"];
     damaged
-        .exits(1)
-        .complains(&["rgb/000040.png", "PNG, JPEG or TIFF", "by depth alone"])
+        .fails(&parts)
         .complains(&["1 files could not be used; 0 rows are unchanged"]);
-    let (_, refined) = world.refine(&rows, &["--models", "models_color", "--no-color"]);
+    let (_, refined) = world.refine(&rows, "--models models_color --no-color");
     for (color, depth) in refined.iter().zip(&depth_only) {
         let (a, b) = (color.camera_from_object(), depth.camera_from_object());
         assert!((a.translation.vector - b.translation.vector).norm() < 1e-4);
     }
     let path = world.path("models_color/obj_000001.ply");
-    let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(&path, text.replacen("250 0 0", "250 none 0", 1)).unwrap();
-    let (warned, _) = world.refine(&rows, &["--models", "models_color", "--no-color"]);
+    world.replace(path, "250 0 0", "250 none 0");
+    let (warned, _) = world.refine(&rows, "--models models_color --no-color");
     assert!(!warned.exits(0).err.contains("a color"));
     std::fs::remove_dir_all(&rgb).unwrap();
-    let (warned, _) = world.refine(&rows, &["--models", "models_color"]);
-    warned
-        .exits(0)
-        .complains(&["obj_000001.ply", "a color that is not a number"]);
+    let (warned, _) = world.refine(&rows, "--models models_color");
+    warned.warns(&["obj_000001.ply", "a color that is not a number"]);
     world
-        .run(&["--models", "nothing"])
-        .exits(1)
-        .complains(&["folder of models", "nothing"]);
+        .run("--models nothing")
+        .fails(&["folder of models", "nothing"]);
 }

@@ -1,45 +1,24 @@
 //! Runs that are killed or interrupted, or whose disk is full.
 //!
 //! Existing files are kept, written files are complete, and a run can be continued.
-#![cfg(unix)]
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::*;
-use crate::world::*;
 use hicp_io::LengthUnit;
 use hicp_io::bop::{ResultRow, write_results};
 use hicp_sim::Household;
 use rand::RngExt as _;
 
-type Files = BTreeMap<PathBuf, Vec<u8>>;
+/// The folder of the outputs of jobs.
+const OUT: &str = "out";
 
-/// Returns all files below a folder.
-fn files(folder: &Path) -> Files {
-    let mut found = Files::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(next) = folders.pop() {
-        for entry in std::fs::read_dir(next).unwrap().map(Result::unwrap) {
-            let path = entry.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if let Ok(content) = std::fs::read(&path) {
-                found.insert(path.strip_prefix(folder).unwrap().to_owned(), content);
-            }
-        }
-    }
-    found
-}
-
-/// A command that saves its work, with its outputs.
+/// A command that saves its work.
 struct Job {
-    folder: tempfile::TempDir,
-    arguments: Vec<&'static str>,
-    /// The folder of the outputs.
-    out: &'static str,
+    folder: Folder,
+    command: String,
     /// The output that grows row by row.
     grows: Option<&'static str>,
     /// The file that keeps the finished work.
@@ -49,73 +28,64 @@ struct Job {
 fn bop_refine(rows: impl Fn(&World) -> Vec<ResultRow>) -> Job {
     let world = World::new();
     write_results(world.path("in.csv"), &rows(&world)).unwrap();
-    let words =
+    let command =
         "bop refine --dataset . --results in.csv --output out/it --no-time --threads 1 --resume";
     Job {
         folder: world.folder,
-        arguments: words.split(' ').collect(),
-        out: "out",
+        command: command.to_owned(),
         grows: None,
         kept: "it.journal",
     }
 }
 
-fn experiment(poses: &'static str) -> Job {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::create_dir(folder.path().join("meshes")).unwrap();
+fn experiment(poses: u32) -> Job {
+    let folder = Folder::new();
+    folder.create_dir("meshes");
     let mesh = Household::Mug.solid().to_mesh().unwrap();
-    hicp_io::write_ply(
-        folder.path().join("meshes/mug.ply"),
-        &mesh,
-        LengthUnit::Meters,
-    )
-    .unwrap();
-    let words =
-        "experiment init-noise --objects meshes --no-times --threads 1 --out out --resume --poses";
+    hicp_io::write_ply(folder.path("meshes/mug.ply"), &mesh, LengthUnit::Meters).unwrap();
+    let fixed = "experiment init-noise --objects meshes --no-times --threads 1 --out out --resume";
     Job {
         folder,
-        arguments: words.split(' ').chain([poses]).collect(),
-        out: "out",
+        command: format!("{fixed} --poses {poses}"),
         grows: Some("cases.csv"),
         kept: "cases.csv",
     }
 }
 
 impl Job {
-    fn out(&self) -> PathBuf {
-        self.folder.path().join(self.out)
+    /// Returns the path of the file that keeps the finished work.
+    fn kept(&self) -> PathBuf {
+        self.folder.path(OUT).join(self.kept)
     }
 
     /// Empties the folder of the outputs.
     fn begin(&self) {
-        let _ = std::fs::remove_dir_all(self.out());
-        std::fs::create_dir(self.out()).unwrap();
+        let _ = std::fs::remove_dir_all(self.folder.path(OUT));
+        self.folder.create_dir(OUT);
     }
 
     fn spawn(&self) -> Child {
-        program(self.folder.path())
-            .args(&self.arguments)
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap()
+        let mut program = program(self.folder.root());
+        program.args(self.command.split(' '));
+        program.stdout(Stdio::null()).stderr(Stdio::piped());
+        program.spawn().unwrap()
     }
 
     fn finish(&self) -> Files {
-        run(self.folder.path(), &self.arguments).exits(0);
-        files(&self.out())
+        self.folder.command(&self.command).exits(0);
+        self.folder.files(OUT)
     }
 
     fn inputs(&self) -> Files {
-        let mut all = files(self.folder.path());
-        all.retain(|path, _| !path.starts_with(self.out));
+        let mut all = self.folder.files("");
+        all.retain(|path, _| !path.starts_with(OUT));
         all
     }
 
     /// Asserts that every output equals that of the whole run or does not exist.
     #[track_caller]
     fn assert_whole_or_absent(&self, whole: &Files) {
-        for (path, content) in files(&self.out()) {
+        for (path, content) in self.folder.files(OUT) {
             let name = path.to_string_lossy();
             if name.starts_with(".hicp-") || name.ends_with(".journal") {
                 continue;
@@ -145,8 +115,7 @@ impl Job {
             // The run may have finished before.
             killed += usize::from(!child.wait().unwrap().success());
             self.assert_whole_or_absent(&whole);
-            let kept = std::fs::read(self.out().join(self.kept)).unwrap_or_default();
-            half_done += usize::from(kept.iter().filter(|byte| **byte == b'\n').count() > 1);
+            half_done += usize::from(n_lines(&self.kept()) > 1);
             let mut resumed = self.finish();
             // A killed run may leave temporary files, which nothing reads.
             resumed.retain(|path, _| !path.to_string_lossy().starts_with(".hicp-"));
@@ -155,7 +124,7 @@ impl Job {
         }
         println!(
             "{}: {killed} kills, {half_done} with finished work, all resumed to the same bytes",
-            self.arguments[..2].join(" ")
+            self.command
         );
     }
 
@@ -164,7 +133,7 @@ impl Job {
         self.begin();
         let whole = self.finish();
         let (took, told) = self.interrupted(signal);
-        assert!(told.contains("--resume"), "{told}");
+        assert_contains(&told, &["--resume"]);
         self.assert_whole_or_absent(&whole);
         assert!(self.finish() == whole);
         took
@@ -176,24 +145,14 @@ impl Job {
     fn interrupted(&self, signal: &str) -> (Duration, String) {
         self.begin();
         let mut child = self.spawn();
-        let begun = Instant::now();
-        let kept = self.out().join(self.kept);
-        let lines = || {
-            let text = std::fs::read(&kept).unwrap_or_default();
-            text.iter().filter(|byte| **byte == b'\n').count()
-        };
-        while lines() < 2 {
-            assert!(child.try_wait().unwrap().is_none(), "finished too early");
-            assert!(begun.elapsed() < Duration::from_secs(300));
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        let kept = self.kept();
+        wait_for_lines(&mut child, &kept, 2);
         let sent = Instant::now();
         assert!(send(signal, &child));
         let output = child.wait_with_output().unwrap();
         let took = sent.elapsed();
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(130), "{told}");
-        assert!(lines() >= 2);
+        let told = Run::from(output).exits(130).err;
+        assert!(n_lines(&kept) >= 2);
         (took, told)
     }
 }
@@ -201,7 +160,7 @@ impl Job {
 #[test]
 fn killed_at_a_few_random_moments() {
     bop_refine(|world| grouped(world, 6)).kill(3);
-    experiment("10").kill(3);
+    experiment(10).kill(3);
 }
 
 /// The same test with more kills.
@@ -211,7 +170,7 @@ fn killed_at_a_few_random_moments() {
 #[ignore = "takes minutes"]
 fn killed_at_fifty_random_moments() {
     bop_refine(|world| grouped(world, 12)).kill(50);
-    experiment("10").kill(50);
+    experiment(10).kill(50);
 }
 
 #[test]
@@ -219,14 +178,11 @@ fn interrupted_runs_save_finished_work_and_name_the_option_to_continue() {
     for (job, signal) in [
         (bop_refine(grouped_for_signals), "-INT"),
         (bop_refine(grouped_for_signals), "-TERM"),
-        (experiment("40"), "-INT"),
-        (experiment("40"), "-TERM"),
+        (experiment(40), "-INT"),
+        (experiment(40), "-TERM"),
     ] {
         let took = job.interrupt(signal);
-        println!(
-            "{} {signal}: ended after {took:?}",
-            job.arguments[..2].join(" ")
-        );
+        println!("{} {signal}: ended after {took:?}", job.command);
     }
 }
 
@@ -236,50 +192,31 @@ fn an_interrupted_comparison_continues_with_the_same_command() {
     let refine = bop_refine(grouped_for_signals);
     let words = "bop compare --dataset . --init in.csv --pipelines hybrid --out out --threads 1";
     let job = Job {
-        arguments: words.split(' ').collect(),
+        command: words.to_owned(),
         kept: "hybrid.csv.journal",
         ..refine
     };
     let (_, told) = job.interrupted("-INT");
-    assert!(told.contains("continue with the same command"), "{told}");
-    let run = run(job.folder.path(), &job.arguments).exits(0);
-    assert!(run.out.contains("frames from the journal"), "{}", run.out);
-    assert!(!job.out().join(job.kept).exists());
+    assert_contains(&told, &["continue with the same command"]);
+    let run = job.folder.command(&job.command).exits(0);
+    run.prints(&["frames from the journal"]);
+    assert!(!job.kept().exists());
 }
 
 /// Runs the program in a shell after another command.
 ///
 /// If that command cannot run, prints a message and returns `None`.
-fn in_shell(folder: &Path, user_namespace: bool, first: &str, arguments: &[&str]) -> Option<Run> {
+fn in_shell(folder: &Path, user_namespace: bool, first: &str, words: &str) -> Option<Run> {
     let script = format!("{first} || exit 99; exec \"$@\"");
-    let mut words = Vec::new();
+    let mut shell = vec!["sh", "-c", &script, "sh", env!("CARGO_BIN_EXE_hybrid-icp")];
     if user_namespace {
-        words.extend(["unshare", "-rm"]);
+        shell.splice(..0, ["unshare", "-rm"]);
     }
-    words.extend(["sh", "-c", &script, "sh", env!("CARGO_BIN_EXE_hybrid-icp")]);
-    let output = Command::new(words[0])
-        .args(&words[1..])
-        .args(arguments)
-        .current_dir(folder)
-        .output();
-    let ran = |code: Option<i32>, err: &str| match code {
-        Some(99) => false,
-        Some(1) => err.starts_with("error: "),
-        _ => true,
-    };
-    match output {
-        Ok(output)
-            if ran(
-                output.status.code(),
-                &String::from_utf8_lossy(&output.stderr),
-            ) =>
-        {
-            Some(Run {
-                code: output.status.code().unwrap_or(-1),
-                out: String::from_utf8_lossy(&output.stdout).into_owned(),
-                err: String::from_utf8_lossy(&output.stderr).into_owned(),
-            })
-        }
+    let mut command = Command::new(shell[0]);
+    let command = command.args(&shell[1..]).args(words.split_whitespace());
+    let run = command.current_dir(folder).output().map(Run::from);
+    match run {
+        Ok(run) if run.code != 99 && (run.code != 1 || run.err.starts_with("error: ")) => Some(run),
         other => {
             println!("skipped: cannot run {first:?}: {other:?}");
             None
@@ -287,83 +224,61 @@ fn in_shell(folder: &Path, user_namespace: bool, first: &str, arguments: &[&str]
     }
 }
 
-const REFINE: [&str; 15] = [
-    "refine",
-    "--model",
-    "mesh.ply",
-    "--model-unit=m",
-    "--depth=depth.png",
-    "--depth-scale=0.1",
-    "--mask",
-    "mask.png",
-    "--camera",
-    "camera.json",
-    "--init",
-    "init.json",
-    "--output=disk/out.json",
-    "--trace=disk/trace.jsonl",
-    "--overlay=disk/overlay.png",
-];
+const REFINE: &str = "refine --model mesh.ply --model-unit m --depth depth.png --depth-scale 0.1 \
+    --mask mask.png --camera camera.json --init init.json --output disk/out.json \
+    --trace disk/trace.jsonl --overlay disk/overlay.png";
 
 #[test]
 fn a_full_disk_leaves_existing_files() {
     // A limit on the size of files simulates a full disk: writing fails in the middle of a file.
     let scene = Scene::new();
-    std::fs::create_dir(scene.path("disk")).unwrap();
+    scene.create_dir("disk");
     for name in ["out.json", "trace.jsonl", "overlay.png"] {
         scene.write(&format!("disk/{name}"), "the user's");
     }
     let limit = "ulimit -f 1";
-    if let Some(run) = in_shell(scene.folder.path(), false, limit, &REFINE) {
-        run.exits(1)
-            .complains(&["error: cannot write disk/", "too large"]);
-        let names = names(&scene.path("disk"));
+    if let Some(run) = in_shell(scene.root(), false, limit, REFINE) {
+        run.fails(&["error: cannot write disk/", "too large"]);
+        let names = scene.names("disk");
         assert_eq!(names, ["out.json", "overlay.png", "trace.jsonl"]);
-        assert_eq!(
-            std::fs::read(scene.path("disk/overlay.png")).unwrap(),
-            b"the user's"
-        );
+        assert_eq!(scene.bytes("disk/overlay.png"), b"the user's");
     }
     // A run ends if its journal cannot grow. With free space, it can continue.
     let job = bop_refine(|world| grouped(world, 6));
     job.begin();
     let whole = job.finish();
     job.begin();
-    if let Some(run) = in_shell(job.folder.path(), false, limit, &job.arguments) {
-        run.exits(1).complains(&["cannot write", "too large"]);
-        assert!(!job.out().join("it").exists());
+    if let Some(run) = in_shell(job.folder.root(), false, limit, &job.command) {
+        run.fails(&["cannot write", "too large"]);
+        assert!(!job.folder.path("out/it").exists());
         assert!(job.finish() == whole);
     }
     // If this user may mount, a small disk is filled.
     let disk = "mount -t tmpfs -o size=8k none disk && echo old > disk/out.json";
-    if let Some(run) = in_shell(scene.folder.path(), true, disk, &REFINE) {
-        run.exits(1)
-            .complains(&["error: cannot write disk/", "No space left"]);
+    if let Some(run) = in_shell(scene.root(), true, disk, REFINE) {
+        run.fails(&["error: cannot write disk/", "No space left"]);
     }
     // Devices are written in place.
     if Path::new("/dev/full").exists() {
         let scene = Scene::new().with("--output", "/dev/full");
         scene
             .run()
-            .exits(1)
-            .complains(&["cannot write /dev/full", "No space left"]);
+            .fails(&["cannot write /dev/full", "No space left"]);
     }
 }
 
 #[test]
 fn a_read_only_folder_is_reported_before_anything_is_computed() {
     let scene = Scene::new();
-    std::fs::create_dir(scene.path("disk")).unwrap();
+    scene.create_dir("disk");
     let disk = "mount -t tmpfs none disk && echo old > disk/out.json && mount -o remount,ro disk";
-    if let Some(run) = in_shell(scene.folder.path(), true, disk, &REFINE) {
-        run.exits(1)
-            .complains(&["error: cannot write disk/out.json", "Read-only"]);
+    if let Some(run) = in_shell(scene.root(), true, disk, REFINE) {
+        run.fails(&["error: cannot write disk/out.json", "Read-only"]);
     }
     let job = bop_refine(|world| grouped(world, 1));
     job.begin();
     let disk = "mount -t tmpfs none out && mount -o remount,ro out";
-    if let Some(run) = in_shell(job.folder.path(), true, disk, &job.arguments) {
-        run.exits(1)
-            .complains(&["error: cannot write out/it", "Read-only"]);
+    if let Some(run) = in_shell(job.folder.root(), true, disk, &job.command) {
+        run.fails(&["error: cannot write out/it", "Read-only"]);
     }
 }

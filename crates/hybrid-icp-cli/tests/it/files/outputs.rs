@@ -1,15 +1,10 @@
 //! Outputs never replace other data of the user.
 //!
 //! Such data are redirected files, files of the dataset, rows of the input, and other outputs.
-#![cfg(unix)]
 
-use std::collections::BTreeMap;
-use std::fs::read_to_string;
 use std::os::unix::fs::symlink;
-use std::path::{Path, PathBuf};
 
 use crate::common::*;
-use crate::world::*;
 use hicp_io::bop::write_results;
 #[cfg(target_os = "linux")]
 use {serde_json::Value, std::fs::File, std::os::unix::fs::MetadataExt};
@@ -17,15 +12,10 @@ use {serde_json::Value, std::fs::File, std::os::unix::fs::MetadataExt};
 /// Runs the program with its standard output in a file.
 #[cfg(target_os = "linux")]
 #[track_caller]
-fn redirected(folder: &Path, words: &str, file: File) -> Run {
-    let mut command = program(folder);
-    command.args(words.split(' '));
-    let output = command.stdout(file).output().unwrap();
-    Run {
-        code: output.status.code().unwrap(),
-        out: String::from_utf8(output.stdout).unwrap(),
-        err: String::from_utf8(output.stderr).unwrap(),
-    }
+fn redirected(folder: &Folder, words: &str, file: File) -> Run {
+    let mut command = program(folder.root());
+    command.args(words.split(' ')).stdout(file);
+    Run::from(command.output().unwrap())
 }
 
 #[cfg(target_os = "linux")]
@@ -37,12 +27,12 @@ const REFINE: &str = "refine --model mesh.ply --model-unit m --depth depth.png -
 #[test]
 fn the_standard_output_is_added_to() {
     let scene = Scene::new();
-    let folder = scene.folder.path();
+    let folder = &scene.folder;
     scene.write("log", "precious\n");
     let inode = std::fs::metadata(scene.path("log")).unwrap().ino();
     let log = File::options().append(true).open(scene.path("log"));
     redirected(folder, &format!("{REFINE} -"), log.unwrap()).exits(0);
-    let text = read_to_string(scene.path("log")).unwrap();
+    let text = scene.read("log");
     let added = text.strip_prefix("precious\n").unwrap();
     // The summary on the stream comes after the result and does not overwrite it.
     let end = added.rfind('}').unwrap() + 1;
@@ -53,11 +43,11 @@ fn the_standard_output_is_added_to() {
     // As with `> log`, this file is not opened for appending, so the stream has its own position.
     let log = File::create(scene.path("log")).unwrap();
     redirected(folder, &format!("{REFINE} -"), log).exits(0);
-    let text = read_to_string(scene.path("log")).unwrap();
+    let text = scene.read("log");
     let end = text.rfind('}').unwrap() + 1;
     serde_json::from_str::<Value>(&text[..end]).unwrap();
     assert!(text[end..].contains("MVE"), "{text}");
-    assert!(!names(folder).iter().any(|name| name.ends_with(".tmp")));
+    assert!(!folder.names("").iter().any(|name| name.ends_with(".tmp")));
 }
 
 /// Other names of a redirected stream are refused.
@@ -70,14 +60,9 @@ fn files_behind_streams_are_not_replaced() {
     for name in ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"] {
         scene.write("log", "precious\n");
         let log = File::options().append(true).open(scene.path("log"));
-        redirected(
-            scene.folder.path(),
-            &format!("{REFINE} {name}"),
-            log.unwrap(),
-        )
-        .exits(1)
-        .complains(&[&format!("cannot write {name}"), "- for the standard output"]);
-        assert_eq!(read_to_string(scene.path("log")).unwrap(), "precious\n");
+        redirected(&scene, &format!("{REFINE} {name}"), log.unwrap())
+            .fails(&[&format!("cannot write {name}"), "- for the standard output"]);
+        assert_eq!(scene.read("log"), "precious\n");
     }
 }
 
@@ -85,54 +70,39 @@ fn files_behind_streams_are_not_replaced() {
 #[test]
 fn the_standard_output_of_the_commands_over_datasets() {
     let world = World::new();
-    let folder = world.folder.path();
+    let folder = &world.folder;
     write_results(world.path("in.csv"), &world.rows()).unwrap();
     let add_to = |name: &str, words: &str| {
         let file = File::options().append(true).open(world.path(name));
         redirected(folder, words, file.unwrap())
     };
-    std::fs::write(world.path("log"), "precious\n").unwrap();
+    world.write("log", "precious\n");
     let words = "bop eval --dataset . --results in.csv --json -";
     add_to("log", words).exits(0);
-    let text = read_to_string(world.path("log")).unwrap();
+    let text = world.read("log");
     assert!(text.starts_with("precious\n{"), "{text}");
 
     // There is no journal next to a stream.
-    std::fs::write(world.path("-.journal"), "my notes").unwrap();
-    std::fs::write(world.path("log"), "").unwrap();
+    world.write("-.journal", "my notes");
+    world.write("log", "");
     let refine = "bop refine --dataset . --results in.csv --no-time --output";
     add_to("log", &format!("{refine} -")).exits(0);
-    run(folder, format!("{refine} out.csv").split(' ')).exits(0);
-    let rows = read_to_string(world.path("out.csv")).unwrap();
-    let text = read_to_string(world.path("log")).unwrap();
+    folder.command(format!("{refine} out.csv")).exits(0);
+    let rows = world.read("out.csv");
+    let text = world.read("log");
     assert!(text.starts_with(&rows), "{text}");
-    let notes = std::fs::read(world.path("-.journal")).unwrap();
+    let notes = world.bytes("-.journal");
     assert_eq!(notes, b"my notes");
-}
-
-/// Returns all files below a folder with their contents.
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            found.extend(files(&path));
-        } else {
-            let content = std::fs::read(&path).unwrap();
-            found.insert(path, content);
-        }
-    }
-    found
 }
 
 /// Creates a dataset with the usual other files, and with results next to it.
 fn dataset() -> World {
     let world = World::new();
     for name in ["train_pbr/000007", "models_eval", "models_fine", "results"] {
-        std::fs::create_dir_all(world.path(name)).unwrap();
+        world.create_dir(name);
     }
     let targets = r#"[{"scene_id": 3, "im_id": 40, "obj_id": 1, "inst_count": 2}]"#;
-    std::fs::write(world.path("test_targets_bop19.json"), targets).unwrap();
+    world.write("test_targets_bop19.json", targets);
     for name in [
         "camera_uw.json",
         "dataset_info.md",
@@ -143,7 +113,7 @@ fn dataset() -> World {
         "results/old.json",
         "old.json",
     ] {
-        std::fs::write(world.path(name), "{}").unwrap();
+        world.write(name, "{}");
     }
     write_results(world.path("in.csv"), &world.rows()).unwrap();
     world
@@ -175,9 +145,9 @@ const COMMANDS: [(&str, &str); 7] = [
 #[test]
 fn files_of_the_dataset_are_spared_by_every_command() {
     let world = dataset();
-    let folder = world.folder.path();
+    let folder = &world.folder;
     symlink("test/000003/scene_gt.json", world.path("link.json")).unwrap();
-    let before = files(folder);
+    let before = folder.files("");
     for (command, option) in COMMANDS {
         for path in [
             "models/obj_000002.ply",
@@ -188,28 +158,28 @@ fn files_of_the_dataset_are_spared_by_every_command() {
             "link.json",
         ] {
             let words = format!("{command} {option} {path}");
-            let told = run(folder, words.split(' ')).exits(1);
+            let told = folder.command(words).exits(1);
             let names = format!("error: {option} names {path}, which belongs to");
             assert_eq!(told.complains(&[&names, "overwritten"]).out, "");
         }
-        assert_eq!(files(folder), before, "{command} {option}");
+        assert_eq!(folder.files(""), before, "{command} {option}");
     }
     let words = "bop compare --dataset . --init in.csv --pipelines scene_gt.toml --out test/000003";
-    let pipeline = run(folder, ["pipelines", "--show", "hybrid"]).out;
-    std::fs::write(world.path("scene_gt.toml"), pipeline).unwrap();
-    run(folder, words.split(' '))
-        .exits(1)
-        .complains(&["--out names test/000003/scene_gt.json", "its scenes"]);
+    let pipeline = folder.command("pipelines --show hybrid").out;
+    world.write("scene_gt.toml", pipeline);
+    folder
+        .command(words)
+        .fails(&["--out names test/000003/scene_gt.json", "its scenes"]);
 }
 
 #[test]
 fn files_are_divided_into_those_of_the_dataset_and_others() {
     let world = dataset();
-    let folder = world.folder.path();
-    let before = files(folder);
+    let folder = &world.folder;
+    let before = folder.files("");
     let eval = |json: &str| {
         let words = "bop eval --dataset . --results in.csv --json";
-        run(folder, words.split(' ').chain([json]))
+        folder.command(format!("{words} {json}"))
     };
     // Files in the folders of any split belong to the dataset, and so do the usual files next to
     // them.
@@ -220,11 +190,9 @@ fn files_are_divided_into_those_of_the_dataset_and_others() {
         "train_pbr/000007/scene_gt.json",
         "models_fine/obj_000001.ply",
     ] {
-        eval(path)
-            .exits(1)
-            .complains(&[path, "belongs to the dataset"]);
+        eval(path).fails(&[path, "belongs to the dataset"]);
     }
-    assert_eq!(files(folder), before);
+    assert_eq!(folder.files(""), before);
     std::fs::remove_dir_all(world.path("models_eval")).unwrap();
     // Outputs of an earlier run inside the dataset's folder may be replaced, and new files may be
     // created anywhere.
@@ -237,20 +205,18 @@ fn files_are_divided_into_those_of_the_dataset_and_others() {
         "test/000003/new.json",
     ] {
         eval(path).exits(0);
-        let text = read_to_string(world.path(path)).unwrap();
+        let text = world.read(path);
         assert!(text.contains("\"ar\""), "{path}");
     }
     // With the split `.`, the dataset's folder contains scenes, but also other files.
     for path in ["7/scene_gt.json", "obj_000001.ply"] {
         std::fs::create_dir_all(world.path(path).parent().unwrap()).unwrap();
-        std::fs::write(world.path(path), "{}").unwrap();
+        world.write(path, "{}");
         let words = format!("bop eval --dataset . --split . --results in.csv --json {path}");
-        run(folder, words.split(' '))
-            .exits(1)
-            .complains(&["belongs to the dataset"]);
+        folder.command(words).fails(&["belongs to the dataset"]);
     }
     let words = "bop eval --dataset . --split . --results in.csv --json old.json";
-    let told = run(folder, words.split(' ')).exits(1);
+    let told = folder.command(words).exits(1);
     assert!(!told.err.contains("belongs"), "{}", told.err);
 }
 
@@ -258,8 +224,8 @@ fn files_are_divided_into_those_of_the_dataset_and_others() {
 #[test]
 fn links_do_not_hide_a_dataset() {
     let world = dataset();
-    let folder = world.folder.path();
-    std::fs::create_dir(world.path("disk")).unwrap();
+    let folder = &world.folder;
+    world.create_dir("disk");
     for (name, aside) in [
         ("test/000012", "disk/twelve"),
         ("models/obj_000001.ply", "disk/mesh"),
@@ -270,7 +236,7 @@ fn links_do_not_hide_a_dataset() {
         symlink(world.path(aside), world.path(name)).unwrap();
     }
     symlink(".", world.path("again")).unwrap();
-    let before = files(&world.path("disk"));
+    let before = world.files("disk");
     for path in [
         "test/000012/scene_gt.json",
         "disk/twelve/scene_gt.json",
@@ -283,31 +249,30 @@ fn links_do_not_hide_a_dataset() {
         "disk/targets",
     ] {
         let words = "bop show --dataset again --scene 3 --image 40 --results in.csv --out";
-        run(folder, words.split(' ').chain([path]))
-            .exits(1)
-            .complains(&[path, "belongs to the dataset again"]);
+        folder
+            .command(format!("{words} {path}"))
+            .fails(&[path, "belongs to the dataset again"]);
     }
-    assert_eq!(files(&world.path("disk")), before);
+    assert_eq!(world.files("disk"), before);
 }
 
 #[test]
 fn a_result_file_in_a_split_is_refined_in_place() {
     let world = dataset();
-    let path = world.path("test/in.csv");
-    write_results(&path, &world.rows()[..2]).unwrap();
-    let before = std::fs::read(&path).unwrap();
+    write_results(world.path("test/in.csv"), &world.rows()[..2]).unwrap();
+    let before = world.bytes("test/in.csv");
     let words = "bop refine --dataset . --results test/in.csv --output ./test/in.csv";
-    run(world.folder.path(), words.split(' ')).exits(0);
-    assert_ne!(std::fs::read(&path).unwrap(), before);
+    world.command(words).exits(0);
+    assert_ne!(world.bytes("test/in.csv"), before);
 }
 
 /// A run in place writes every row or none.
 #[test]
 fn rows_that_are_left_out_are_not_lost_in_place() {
     let world = dataset();
-    let folder = world.folder.path();
+    let folder = &world.folder;
     symlink("in.csv", world.path("link.csv")).unwrap();
-    let before = std::fs::read(world.path("in.csv")).unwrap();
+    let before = world.bytes("in.csv");
     // There are ten rows, three for each image with a hammer, and two targets.
     for (option, left_out) in [
         ("--limit 4", "--limit leaves out 6 of its 10 rows"),
@@ -325,18 +290,18 @@ fn rows_that_are_left_out_are_not_lost_in_place() {
         for output in ["in.csv", "./in.csv", "link.csv"] {
             let words =
                 format!("bop refine --dataset . --results in.csv --output {output} {option}");
-            let told = run(folder, words.split(' ')).exits(1);
+            let told = folder.command(words).exits(1);
             let both = format!("--output and --results both name {output}, and {left_out}");
             told.complains(&[&both, "would be lost"]);
-            assert_eq!(std::fs::read(world.path("in.csv")).unwrap(), before);
+            assert_eq!(world.bytes("in.csv"), before);
             assert!(!world.path("in.csv.journal").exists());
         }
     }
     // Options that leave no row out are accepted.
     let words =
         "bop refine --dataset . --results in.csv --output in.csv --limit 10 --shard 1/1 --top-k 2";
-    run(folder, words.split(' ')).exits(0);
+    folder.command(words).exits(0);
     let rows = hicp_io::bop::read_results(world.path("in.csv")).unwrap();
     assert_eq!(rows.len(), 10);
-    assert_ne!(std::fs::read(world.path("in.csv")).unwrap(), before);
+    assert_ne!(world.bytes("in.csv"), before);
 }

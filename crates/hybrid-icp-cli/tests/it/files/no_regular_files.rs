@@ -2,14 +2,12 @@
 //!
 //! Each is reported, and the program never waits. One function of `hicp-io` opens the files that
 //! commands read, so one command per kind of reader is enough.
-#![cfg(unix)]
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::*;
-use crate::world::*;
 use hicp_io::bop::write_results;
 
 /// After this time, the program counts as hanging; these runs compute almost nothing.
@@ -17,9 +15,9 @@ const HANGS_AFTER: Duration = Duration::from_secs(300);
 
 /// Runs the program, and kills it if it hangs.
 #[track_caller]
-fn ends(folder: &Path, words: &[&str]) -> Run {
-    let mut child = program(folder)
-        .args(words)
+fn ends(folder: &Folder, words: &str) -> Run {
+    let mut child = program(folder.root())
+        .args(words.split_whitespace())
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -33,13 +31,7 @@ fn ends(folder: &Path, words: &[&str]) -> Run {
         }
         std::thread::sleep(Duration::from_millis(2));
     }
-    let output = child.wait_with_output().unwrap();
-    let text = |bytes| String::from_utf8_lossy(bytes).into_owned();
-    Run {
-        code: output.status.code().unwrap(),
-        out: text(&output.stdout),
-        err: text(&output.stderr),
-    }
+    Run::from(child.wait_with_output().unwrap())
 }
 
 /// Things that may be in the place of a file.
@@ -64,13 +56,12 @@ fn take_away(path: &Path) {
 
 /// Replaces a file by each stranger, asserts that the run fails, and restores the file.
 #[track_caller]
-fn each_is_reported(folder: &Path, words: &str, file: &str) {
-    let words: Vec<&str> = words.split(' ').collect();
-    let (path, aside) = (folder.join(file), folder.join("aside"));
+fn each_is_reported(folder: &Folder, words: &str, file: &str) {
+    let (path, aside) = (folder.path(file), folder.path("aside"));
     std::fs::rename(&path, &aside).unwrap();
     for kind in STRANGERS {
         put(kind, &path);
-        let told = ends(folder, &words);
+        let told = ends(folder, words);
         assert_eq!(told.code, 1, "{kind} for {file}: {}{}", told.out, told.err);
         assert!(
             told.err.starts_with("error: "),
@@ -86,11 +77,11 @@ fn each_is_reported(folder: &Path, words: &str, file: &str) {
 #[test]
 fn every_input_of_refine() {
     let scene = Scene::new();
-    let hybrid = ends(scene.folder.path(), &["pipelines", "--show", "hybrid"]).exits(0);
+    let hybrid = ends(&scene, "pipelines --show hybrid").exits(0);
     scene.write("mine.toml", hybrid.out);
     let words = "refine --model mesh.ply --model-unit m --depth depth.png --depth-scale 0.1 --mask mask.png \
                  --camera camera.json --init init.json --pipeline mine.toml --output out.json";
-    let folder = scene.folder.path();
+    let folder = &scene.folder;
     for file in [
         "mesh.ply",
         "depth.png",
@@ -103,19 +94,19 @@ fn every_input_of_refine() {
         assert!(!scene.path("out.json").exists(), "{file}");
     }
     // With all files restored, the command succeeds.
-    ends(folder, &words.split(' ').collect::<Vec<_>>()).exits(0);
+    ends(folder, words).exits(0);
 }
 
 #[test]
 fn results_and_journal_of_a_dataset() {
     let world = World::new();
-    let folder = world.folder.path();
+    let folder = &world.folder;
     write_results(world.path("in.csv"), &world.rows()).unwrap();
     let refine = "bop refine --dataset . --results in.csv --output out.csv";
     each_is_reported(folder, refine, "in.csv");
-    std::fs::write(world.path("out.csv.journal"), "").unwrap();
+    world.write("out.csv.journal", "");
     each_is_reported(folder, refine, "out.csv.journal");
-    std::fs::remove_file(world.path("out.csv.journal")).unwrap();
+    world.remove("out.csv.journal");
     assert!(!world.path("out.csv").exists());
 }
 
@@ -123,10 +114,9 @@ fn results_and_journal_of_a_dataset() {
 #[test]
 fn every_file_of_a_dataset() {
     let world = World::new();
-    let folder = world.folder.path();
+    let folder = &world.folder;
     write_results(world.path("in.csv"), &world.rows()).unwrap();
     let words = "bop refine --dataset . --results in.csv --output out.csv --no-time";
-    let words: Vec<&str> = words.split(' ').collect();
     for file in [
         "models/obj_000001.ply",
         "test/000003/scene_camera.json",
@@ -134,11 +124,11 @@ fn every_file_of_a_dataset() {
         "test/000003/depth/000000.png",
         "test/000003/mask_visib/000000_000000.png",
     ] {
-        let (path, aside) = (folder.join(file), folder.join("aside"));
+        let (path, aside) = (folder.path(file), folder.path("aside"));
         std::fs::rename(&path, &aside).unwrap();
         for kind in STRANGERS {
             put(kind, &path);
-            let told = ends(folder, &words);
+            let told = ends(folder, words);
             assert!(
                 told.code == 0 || told.err.contains("error: "),
                 "{kind} for {file}: {}",

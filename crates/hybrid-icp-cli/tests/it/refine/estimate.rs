@@ -1,13 +1,12 @@
 //! `hybrid-icp estimate` and `hybrid-icp bop estimate`.
 
 use crate::common::*;
-use crate::world::*;
-use hicp_io::bop::{ResultRow, Rle, read_results};
+use hicp_io::bop::{ResultRow, read_results};
 use hicp_io::{LengthUnit, read_mask_png};
 use hicp_sim::Household;
 use hybrid_icp::core::{DepthImage, Isometry3};
 use hybrid_icp::score::ModelPoints;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// Runs `estimate` on a scene, and returns the run.
 fn estimate(scene: &Scene, region: &str) -> Run {
@@ -15,12 +14,7 @@ fn estimate(scene: &Scene, region: &str) -> Run {
         "estimate --model mesh.ply --model-unit m --depth depth.png --depth-scale 0.1 \
          --camera camera.json --output out.json --overlay overlay.png --trace trace.jsonl {region}"
     );
-    run(scene.folder.path(), words.split_whitespace())
-}
-
-fn result(scene: &Scene) -> Value {
-    let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
-    serde_json::from_str(&text).unwrap()
+    scene.command(words)
 }
 
 #[test]
@@ -37,9 +31,9 @@ fn an_object_is_found_in_its_mask_or_box() {
             "{}",
             told.out
         );
-        assert!(told.out.contains(", MVE 0.0"), "{}", told.out);
+        told.prints(&[", MVE 0.0"]);
         assert_eq!(told.err, "");
-        let result = result(&scene);
+        let result = scene.json("out.json");
         assert!(error(CAR, &pose_of(&result), &truth()) < 0.001);
         assert_eq!(result["outcome"], "estimated");
         assert!(result["mve"].as_f64().unwrap() < 0.05);
@@ -48,8 +42,8 @@ fn an_object_is_found_in_its_mask_or_box() {
         let overlay = hicp_io::read_color(scene.path("overlay.png")).unwrap();
         let has = |color: [u8; 3]| overlay.pixels().contains(&color);
         assert!(overlay.width() == 640 && has([86, 180, 233]) && !has([230, 159, 0]));
-        let told = run(scene.folder.path(), ["replay", "trace.jsonl"]).exits(0);
-        assert!(told.out.contains("all equal"), "{}", told.out);
+        let told = scene.command("replay trace.jsonl").exits(0);
+        told.prints(&["all equal"]);
     }
     let bbox = bbox.trim_start_matches("--bbox ");
     let refine = scene.without("--mask").with("--bbox", bbox);
@@ -61,7 +55,7 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
     let scene = Scene::new();
     let told = estimate(&scene, "--bbox 0,0,20,20").exits(0);
     assert!(told.out.starts_with("found no pose: "), "{}", told.out);
-    let found = result(&scene);
+    let found = scene.json("out.json");
     assert_eq!(found["outcome"], "not_found");
     assert!(found.get("cam_R_m2c").is_none() && found.get("cam_t_m2c").is_none());
     for (region, parts) in [
@@ -75,65 +69,32 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
             &["--bbox", "in pixels", "1 or more"],
         ),
     ] {
-        estimate(&scene, region).exits(2).complains(parts);
+        estimate(&scene, region).refuses(parts);
     }
     // The doctor needs a mask and a pose, so it is no advice for a box.
     hicp_io::write_ply(scene.path("mesh.ply"), &car(), LengthUnit::Centimeters).unwrap();
     for (region, is_advised) in [("--mask mask.png", true), ("--bbox 60,30,200,180", false)] {
-        let told = estimate(&scene, region)
-            .exits(0)
-            .complains(&["--model-unit m"]);
+        let told = estimate(&scene, region).warns(&["--model-unit m"]);
         assert_eq!(told.err.contains("doctor"), is_advised, "{}", told.err);
     }
     let dropped = DepthImage::from_meters(320, 240, vec![0.0; 320 * 240]).unwrap();
     hicp_io::write_depth_png(scene.path("depth.png"), &dropped, 0.1).unwrap();
     let parts = ["--bbox: no depth was measured in the box: check the box and depth.png"];
-    estimate(&scene, "--bbox 60,30,200,180")
-        .exits(0)
-        .complains(&parts);
-    let reason = result(&scene)["reason"].clone();
+    estimate(&scene, "--bbox 60,30,200,180").warns(&parts);
+    let reason = scene.json("out.json")["reason"].clone();
     let expected = "no depth was measured in the box, so that ";
     assert!(reason.as_str().unwrap().starts_with(expected), "{reason}");
-    estimate(&scene, "--bbox 60,30,320,240")
-        .exits(0)
-        .complains(&["the box ends at 380,270", "not two corners"]);
+    estimate(&scene, "--bbox 60,30,320,240").warns(&["the box ends at 380,270", "not two corners"]);
     for bbox in ["320,0,9,9", "-9,0,9,9", "0,240,9,9"] {
         estimate(&scene, &format!("--bbox {bbox}"))
-            .exits(1)
-            .complains(&[bbox, "outside of the 320x240 image depth.png"]);
+            .fails(&[bbox, "outside of the 320x240 image depth.png"]);
     }
-}
-
-/// Returns the visible masks as detections; the last of every image has only a box.
-fn detections(world: &World) -> Vec<Value> {
-    let mut detections = Vec::new();
-    for ((scene, image), truths) in &world.truths {
-        for (index, (id, _)) in truths.iter().enumerate() {
-            let mask = read_mask_png(world.mask_path(*scene, *image, index)).unwrap();
-            let (code, region) = (Rle::of_mask(&mask), mask.bounding_region());
-            let counts = match index {
-                0 => json!(code.counts()),
-                _ => json!(code.to_compressed()),
-            };
-            let (left, top) = (region.u_min, region.v_min);
-            let mut detection = json!({
-                "scene_id": scene, "image_id": image, "category_id": id,
-                "score": 0.5 + 0.1 * index as f64, "time": 0.25,
-                "bbox": [left, top, region.width(), region.height()],
-            });
-            if index + 1 < truths.len() {
-                detection["segmentation"] = json!({"size": [240, 320], "counts": counts});
-            }
-            detections.push(detection);
-        }
-    }
-    detections
 }
 
 fn bop_estimate(world: &World, options: &str) -> (Run, Vec<ResultRow>) {
     let words =
         format!("bop estimate --dataset . --detections found.json --output out.csv {options}");
-    let run = run(world.folder.path(), words.split_whitespace());
+    let run = world.command(words);
     let rows = read_results(world.path("out.csv")).unwrap_or_default();
     (run, rows)
 }
@@ -150,11 +111,18 @@ fn error(obj_id: u32, pose: &Isometry3<f64>, truth: &Isometry3<f64>) -> f64 {
 #[test]
 fn every_detection_becomes_a_row_with_its_score_and_its_time() {
     let world = World::new();
-    let mut found = detections(&world);
-    std::fs::write(world.path("found.json"), json!(found).to_string()).unwrap();
+    // The last detection of every image has only a box.
+    let mut found = world.detections(|index| index > 0);
+    for place in 0..found.len() {
+        let next = found.get(place + 1);
+        if next.is_none_or(|next| next["image_id"] != found[place]["image_id"]) {
+            found[place].as_object_mut().unwrap().remove("segmentation");
+        }
+    }
+    world.write("found.json", json!(found).to_string());
     let (run, rows) = bop_estimate(&world, "--rows rows.csv");
     let run = run.exits(0);
-    assert!(run.out.contains("10  estimated"), "{}", run.out);
+    run.prints(&["10  estimated"]);
     assert_eq!((run.err.as_str(), rows.len()), ("", 10));
     let truths = world.truths.values().flatten();
     for ((row, detection), (id, truth)) in rows.iter().zip(&found).zip(truths) {
@@ -172,25 +140,21 @@ fn every_detection_becomes_a_row_with_its_score_and_its_time() {
     // Without times, the bytes do not depend on threads, shards or interruptions.
     let (run, _) = bop_estimate(&world, "--no-time --threads 1");
     run.exits(0);
-    let output = || std::fs::read_to_string(world.path("out.csv")).unwrap();
+    let output = || world.read("out.csv");
     let whole = output();
     let mut parts = String::new();
     for shard in ["1/2", "2/2"] {
         let (run, _) = bop_estimate(&world, &format!("--no-time --threads 2 --shard {shard}"));
         run.exits(0);
         let part = output();
-        let start = if parts.is_empty() {
-            0
-        } else {
-            part.find('\n').unwrap() + 1
-        };
-        parts.push_str(&part[start..]);
+        let (_, rows) = part.split_once('\n').unwrap();
+        parts.push_str(if parts.is_empty() { &part } else { rows });
     }
     assert_eq!(parts, whole);
 
     // The rows of targets are those with the best scores.
     let targets = json!([{"scene_id": 12, "im_id": 40, "obj_id": CAR, "inst_count": 1}]);
-    std::fs::write(world.path("targets.json"), targets.to_string()).unwrap();
+    world.write("targets.json", targets.to_string());
     let (run, rows) = bop_estimate(&world, "--targets targets.json --rescore mve");
     run.exits(0);
     let truth = world.truths[&(12, 40)][2].1;
@@ -201,21 +165,17 @@ fn every_detection_becomes_a_row_with_its_score_and_its_time() {
     found[0]["category_id"] = json!(ABSENT);
     found[1].as_object_mut().unwrap().remove("bbox");
     found[2]["segmentation"] = json!({"size": [1, 7], "counts": [0, 7]});
-    std::fs::write(world.path("found.json"), json!(found).to_string()).unwrap();
+    world.write("found.json", json!(found).to_string());
     let (run, rows) = bop_estimate(&world, "--no-time --rows rows.csv");
-    let run = run
-        .exits(1)
-        .complains(&["7x1", "320x240", "left out in out.csv"]);
+    let run = run.fails(&["7x1", "320x240", "left out in out.csv"]);
     assert_eq!(rows.len(), 7);
-    for line in [
+    run.prints(&[
         "7  estimated",
         "1  left out: missing model (object 9)",
         "1  left out: no mask of the object",
         "1  left out: damaged file",
-    ] {
-        assert!(run.out.contains(line), "no {line:?} in {}", run.out);
-    }
-    let status = std::fs::read_to_string(world.path("rows.csv")).unwrap();
+    ]);
+    let status = world.read("rows.csv");
     let status: Vec<&str> = status.lines().collect();
     assert_eq!(status[1], "3,0,9,,kept: missing model,,,,");
     assert!(status[4].starts_with("3,40,2,0,refined,"), "{}", status[4]);

@@ -21,9 +21,10 @@ fn labeled() -> Scene {
 fn a_label_image_is_named_and_a_value_selects_the_object() {
     let plain = Scene::new().result();
     let warned = labeled().run().exits(0);
-    for part in ["warning: labels.png: the values 0, 1 and 3", "--mask-value"] {
-        assert!(warned.err.contains(part), "{}", warned.err);
-    }
+    assert_contains(
+        &warned.err,
+        &["warning: labels.png: the values 0, 1 and 3", "--mask-value"],
+    );
     for (option, value) in [("--mask-value", "3"), ("--mask-threshold", "2")] {
         let scene = labeled().with(option, value);
         let selected = scene.result();
@@ -31,11 +32,7 @@ fn a_label_image_is_named_and_a_value_selects_the_object() {
         assert_eq!(selected["warnings"], plain["warnings"], "{option}");
     }
     let parts = ["labels.png: found no pixel", "0, 1 and 3"];
-    labeled()
-        .with("--mask-value", "7")
-        .run()
-        .exits(1)
-        .complains(&parts);
+    labeled().with("--mask-value", "7").run().fails(&parts);
 }
 
 #[test]
@@ -58,22 +55,19 @@ fn a_trace_repeats_the_options_of_other_formats() {
     scene.write("near.txt", "1 0 0 0\n0 1 0 0\n0 0 1 3\n0 0 0 1\n");
     let far = (truth().translation.vector - pose_of(&scene.result()).translation.vector).norm();
     assert!(far < 0.005, "{far}");
-    run(scene.folder.path(), ["replay", "trace.jsonl"]).exits(0);
+    scene.command("replay trace.jsonl").exits(0);
 }
 
 #[test]
 fn the_second_camera_needs_its_pose() {
     let alone = Scene::new().with("--depth-camera", "camera.json");
-    alone.run().exits(2).complains(&["--camera-from-depth"]);
+    alone.run().refuses(&["--camera-from-depth"]);
 }
 
 #[test]
 fn a_mesh_needs_a_unit_unless_the_format_states_it() {
     let scene = Scene::new().without("--model-unit");
-    scene
-        .run()
-        .exits(2)
-        .complains(&["--model-unit", "m, mm or cm"]);
+    scene.run().refuses(&["--model-unit", "m, mm or cm"]);
     // A caller in the same process gets the code and goes on.
     let given = scene.arguments.iter();
     let words = given.flat_map(|(option, value)| [OsStr::new(*option), value]);
@@ -84,10 +78,7 @@ fn a_mesh_needs_a_unit_unless_the_format_states_it() {
 #[test]
 fn pictures_have_the_name_of_a_png_file() {
     let scene = Scene::new().with("--overlay", "a.jpg");
-    scene
-        .run()
-        .exits(1)
-        .complains(&["--overlay names a.jpg", ".png"]);
+    scene.run().fails(&["--overlay names a.jpg", ".png"]);
     assert!(!scene.path("a.jpg").exists());
 }
 
@@ -117,7 +108,7 @@ fn a_result_that_nobody_can_read_is_an_error() {
         let mut shell = Command::new("sh");
         let output = shell
             .args(["-c", &line])
-            .current_dir(scene.folder.path())
+            .current_dir(scene.root())
             .output()
             .unwrap();
         assert_eq!(output.status.code(), Some(code), "{redirected}");

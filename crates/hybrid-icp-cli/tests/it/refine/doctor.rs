@@ -1,5 +1,7 @@
 //! `hybrid-icp doctor`.
 
+use std::ffi::OsString;
+
 use hicp_io::{LengthUnit, pose_to_bop};
 use hybrid_icp::core::{DepthImage, Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::{Value, json};
@@ -8,16 +10,13 @@ use crate::common::*;
 
 /// Runs `doctor` with the arguments of a scene, and returns its text and its JSON.
 fn examine(scene: &Scene) -> (String, Value) {
-    let pairs = scene
-        .arguments
-        .iter()
-        .filter(|(option, _)| *option != "--output");
-    let mut words: Vec<_> = vec!["doctor".into()];
-    words.extend(pairs.flat_map(|(option, value)| [(*option).into(), value.clone()]));
-    let text = run(scene.folder.path(), &words).exits(0).out;
+    let arguments = scene.arguments.iter().cloned();
+    let printed = arguments.filter(|(option, _)| *option != "--output");
+    let words = printed.flat_map(|(option, value)| [option.into(), value]);
+    let mut words: Vec<OsString> = std::iter::once("doctor".into()).chain(words).collect();
+    let text = run(scene.root(), &words).exits(0).out;
     words.push("--json".into());
-    let json = run(scene.folder.path(), &words).exits(0).out;
-    (text, serde_json::from_str(&json).unwrap())
+    (text, run(scene.root(), &words).exits(0).json())
 }
 
 /// Asserts that a fault is named first, with an option that corrects it.
@@ -32,7 +31,7 @@ fn names(scene: &Scene, fault: &str, option: Option<&str>) {
         "{text}"
     );
     if let Some(option) = option {
-        assert!(text.contains(&format!("option: {option}")), "{text}");
+        assert_contains(&text, &[&format!("option: {option}")]);
     }
 }
 
@@ -49,9 +48,7 @@ fn clean_inputs_have_no_fault() {
     let words = "doctor --model mesh.ply --model-unit m --depth depth.png --camera camera.json \
                  --init init.json --bbox 60,30,200,180";
     let folder = Scene::new().folder;
-    run(folder.path(), words.split_whitespace())
-        .exits(2)
-        .complains(&["--mask"]);
+    folder.command(words).refuses(&["--mask"]);
     let (text, json) = examine(&Scene::new());
     assert_eq!(
         (&json["faults"], &json["warnings"]),
@@ -183,12 +180,7 @@ fn wrong_masks_and_images_are_named() {
 fn an_output_file_has_the_json() {
     let scene = Scene::new().with("--model-unit", "mm");
     let (_, json) = examine(&scene);
-    let words = scene
-        .arguments
-        .iter()
-        .flat_map(|(option, value)| [(*option).into(), value.clone()]);
-    let words = std::iter::once("doctor".into()).chain(words);
-    let told = run(scene.folder.path(), words).exits(0);
+    let told = scene.run_command("doctor").exits(0);
     assert!(
         told.out
             .starts_with("fault: the mesh is 1000 times too small"),
@@ -201,11 +193,6 @@ fn an_output_file_has_the_json() {
         first.contains("check --model-unit mm") && !first.contains("doctor"),
         "{first}"
     );
-    assert!(
-        told.err.contains(&format!("warning: {first}\n")),
-        "{}",
-        told.err
-    );
-    let text = std::fs::read_to_string(scene.path("out.json")).unwrap();
-    assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), json);
+    assert_contains(&told.err, &[&format!("warning: {first}\n")]);
+    assert_eq!(scene.json("out.json"), json);
 }

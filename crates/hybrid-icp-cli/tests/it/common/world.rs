@@ -1,16 +1,18 @@
 //! A small BOP dataset in files, with rows of a result file.
 
 use std::collections::BTreeMap;
+use std::ops::Deref;
 use std::path::PathBuf;
 
-use hicp_io::bop::{ResultRow, read_results, write_results};
-use hicp_io::{LengthUnit, read_mesh};
+use hicp_io::bop::{ResultRow, Rle, read_results, write_results};
+use hicp_io::{LengthUnit, read_mask_png, read_mesh};
 use hicp_sim::{Household, perturb, rng};
 use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, TriMesh, Vector3, se3};
 use hybrid_icp::raster::render_depth_image;
 use serde_json::{Value, json};
 
-use crate::common::*;
+use super::folder::{Folder, Run};
+use super::scene::{BOP_CAMERA, camera, car, pose_json};
 
 pub(crate) const CAR: u32 = 1;
 pub(crate) const HAMMER: u32 = 2;
@@ -24,32 +26,31 @@ pub(crate) type Instance = (u32, Isometry3<f64>);
 ///
 /// Every image shows two cars side by side. Image 40 also shows a hammer behind them.
 pub(crate) struct World {
-    pub(crate) folder: tempfile::TempDir,
+    pub(crate) folder: Folder,
     /// True poses by scene and image, in the order of the ground truth.
     pub(crate) truths: BTreeMap<(u32, u32), Vec<Instance>>,
 }
 
 impl World {
     pub(crate) fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
         let mut world = Self {
-            folder,
+            folder: Folder::new(),
             truths: BTreeMap::new(),
         };
         let meshes = BTreeMap::from([
             (CAR, car()),
             (HAMMER, Household::Hammer.solid().to_mesh().unwrap()),
         ]);
-        std::fs::create_dir(world.path("models")).unwrap();
+        world.create_dir("models");
         for (id, mesh) in &meshes {
-            let path = world.path(&format!("models/obj_{id:06}.ply"));
+            let path = world.path(format!("models/obj_{id:06}.ply"));
             hicp_io::write_ply(path, mesh, LengthUnit::Millimeters).unwrap();
         }
         for scene in [3, 12] {
             let mut cameras = serde_json::Map::new();
             let mut ground_truth = serde_json::Map::new();
             for folder in ["depth", "mask_visib"] {
-                std::fs::create_dir_all(world.scene(scene).join(folder)).unwrap();
+                world.create_dir(world.scene(scene).join(folder));
             }
             for image in [0, 40] {
                 let angle = f64::from(scene + image) * 0.03;
@@ -77,21 +78,16 @@ impl World {
                 ground_truth.insert(image.to_string(), stated.collect());
                 world.truths.insert((scene, image), truths);
             }
-            let write = |name: &str, value: Value| {
-                std::fs::write(world.scene(scene).join(name), value.to_string()).unwrap();
-            };
-            write("scene_camera.json", cameras.into());
-            write("scene_gt.json", ground_truth.into());
+            let folder = world.scene(scene);
+            let [cameras, truths] = [cameras, ground_truth].map(Value::from);
+            world.write(folder.join("scene_camera.json"), cameras.to_string());
+            world.write(folder.join("scene_gt.json"), truths.to_string());
         }
         world
     }
 
-    pub(crate) fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
     pub(crate) fn scene(&self, scene: u32) -> PathBuf {
-        self.path(&format!("test/{scene:06}"))
+        self.path(format!("test/{scene:06}"))
     }
 
     pub(crate) fn depth_path(&self, scene: u32, image: u32) -> PathBuf {
@@ -105,8 +101,32 @@ impl World {
 
     /// Returns the diameter of an object's mesh in millimeters.
     pub(crate) fn diameter_mm(&self, obj_id: u32) -> f64 {
-        let path = self.path(&format!("models/obj_{obj_id:06}.ply"));
+        let path = self.path(format!("models/obj_{obj_id:06}.ply"));
         1e3 * Model::new(read_mesh(path, LengthUnit::Millimeters).unwrap()).diameter()
+    }
+
+    /// Returns the visible masks as detections, in the order of the ground truth.
+    ///
+    /// Their run-length codes are compressed or not, by the index of the instance in its image.
+    pub(crate) fn detections(&self, compressed: impl Fn(usize) -> bool) -> Vec<Value> {
+        let mut detections = Vec::new();
+        for ((scene, image), truths) in &self.truths {
+            for (index, (id, _)) in truths.iter().enumerate() {
+                let mask = read_mask_png(self.mask_path(*scene, *image, index)).unwrap();
+                let (code, region) = (Rle::of_mask(&mask), mask.bounding_region());
+                let counts = match compressed(index) {
+                    true => json!(code.to_compressed()),
+                    false => json!(code.counts()),
+                };
+                detections.push(json!({
+                    "scene_id": scene, "image_id": image, "category_id": id,
+                    "score": 0.5 + 0.1 * index as f64, "time": 0.25,
+                    "bbox": [region.u_min, region.v_min, region.width(), region.height()],
+                    "segmentation": {"size": [240, 320], "counts": counts},
+                }));
+            }
+        }
+        detections
     }
 
     /// Renders instances into a depth image and their visible masks.
@@ -156,7 +176,7 @@ impl World {
 
     /// Refines rows; returns the run and the output's rows.
     #[track_caller]
-    pub(crate) fn refine(&self, rows: &[ResultRow], options: &[&str]) -> (Run, Vec<ResultRow>) {
+    pub(crate) fn refine(&self, rows: &[ResultRow], options: &str) -> (Run, Vec<ResultRow>) {
         write_results(self.path("in.csv"), rows).unwrap();
         let run = self.run(options);
         let refined = read_results(self.path("out.csv")).unwrap();
@@ -170,13 +190,11 @@ impl World {
         (run, refined)
     }
 
+    /// Refines the rows of `in.csv`.
     #[track_caller]
-    pub(crate) fn run(&self, options: &[&str]) -> Run {
+    pub(crate) fn run(&self, options: &str) -> Run {
         let fixed = "bop refine --dataset . --split test --results in.csv --output out.csv";
-        run(
-            self.folder.path(),
-            fixed.split(' ').chain(options.iter().copied()),
-        )
+        self.command(&format!("{fixed} {options}"))
     }
 
     /// Asserts that a row is near the true pose of its object that was nearest before refinement.
@@ -198,6 +216,14 @@ impl World {
             before.im_id,
             before.translation_mm(),
         );
+    }
+}
+
+impl Deref for World {
+    type Target = Folder;
+
+    fn deref(&self) -> &Folder {
+        &self.folder
     }
 }
 
