@@ -1,19 +1,9 @@
 //! Unusual and invalid PNG files: each is read correctly or refused with a clear error.
 
-use std::error::Error;
-use std::path::{Path, PathBuf};
-
-use hicp_io::{
-    IoError, IoErrorKind, ReadLimits, read_color, read_depth_png, read_mask_png, write_depth_png,
-};
+use hicp_io::{IoErrorKind, read_color, read_depth_png, read_mask_png, write_depth_png};
 use png::{BitDepth, ColorType, Compression, Encoder};
 
-fn message(error: &IoError) -> String {
-    match error.source() {
-        Some(source) => format!("{error}: {source}"),
-        None => error.to_string(),
-    }
-}
+use crate::common::{Folder, limits, message, refused};
 
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, byte| {
@@ -66,15 +56,9 @@ fn gray16(width: u32, height: u32, interlaced: bool, rows: &[u8]) -> Vec<u8> {
     .concat()
 }
 
-fn write(folder: &Path, name: &str, content: &[u8]) -> PathBuf {
-    let path = folder.join(name);
-    std::fs::write(&path, content).unwrap();
-    path
-}
-
 #[test]
 fn an_interlaced_depth_image_is_read_as_a_plain_one() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let (width, height) = (13_u32, 11_u32);
     let value = |u: u32, v: u32| u16::try_from(1 + 1000 * v + u).unwrap();
     // Adam7 passes: first column, first row, column step, row step.
@@ -99,11 +83,7 @@ fn an_interlaced_depth_image_is_read_as_a_plain_one() {
             );
         }
     }
-    let path = write(
-        folder.path(),
-        "interlaced.png",
-        &gray16(width, height, true, &rows),
-    );
+    let path = folder.write("interlaced.png", gray16(width, height, true, &rows));
     let depth = read_depth_png(&path, 1.0).unwrap();
     assert_eq!((depth.width(), depth.height()), (width, height));
     for v in 0..height {
@@ -115,31 +95,21 @@ fn an_interlaced_depth_image_is_read_as_a_plain_one() {
             );
         }
     }
-    assert_eq!(
-        read_mask_png(&path)
-            .unwrap()
-            .pixels()
-            .iter()
-            .filter(|set| **set)
-            .count(),
-        143
-    );
+    assert_eq!(read_mask_png(&path).unwrap().n_set(), 143);
     // A file truncated at any position gives an error, never an incomplete image.
     let whole = std::fs::read(&path).unwrap();
     // The last chunk and two checksums may be missing, because all pixels are present.
     for length in 0..whole.len() - 12 - 8 {
-        let cut = write(folder.path(), "cut.png", &whole[..length]);
-        assert!(
-            matches!(read_depth_png(&cut, 1.0), Err(IoError { expected, .. }) if expected == "a PNG image"),
-            "{length}"
-        );
+        let cut = folder.write("cut.png", &whole[..length]);
+        let error = read_depth_png(&cut, 1.0).unwrap_err();
+        assert_eq!(error.expected, "a PNG image", "{length}");
     }
 }
 
 #[test]
 fn errors_name_every_other_pixel_type() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.png");
+    let folder = Folder::new();
+    let path = folder.path("a.png");
     use BitDepth::{Eight, Four, One, Sixteen};
     use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
     for (color, depth, bytes, named) in [
@@ -161,10 +131,8 @@ fn errors_name_every_other_pixel_type() {
         let mut writer = encoder.write_header().unwrap();
         writer.write_image_data(&vec![0; bytes]).unwrap();
         writer.finish().unwrap();
-        let text = message(&read_depth_png(&path, 1.0).unwrap_err());
-        for part in ["a.png", named, "expected 16-bit gray"] {
-            assert!(text.contains(part), "no {part:?} in: {text}");
-        }
+        let parts = ["a.png", named, "expected 16-bit gray"];
+        refused(read_depth_png(&path, 1.0), &parts);
         // A mask may be of any type.
         assert_eq!(read_mask_png(&path).unwrap().pixels(), [color == Indexed]);
         assert_eq!(read_color(&path).unwrap().pixels().len(), 1);
@@ -173,7 +141,7 @@ fn errors_name_every_other_pixel_type() {
 
 #[test]
 fn decompression_bombs_are_refused_by_their_headers() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     // Cases: above the limit; within the limit, but more than the file can hold. Below: complete,
     // but above a custom limit.
     for (width, height, parts) in [
@@ -200,23 +168,12 @@ fn decompression_bombs_are_refused_by_their_headers() {
             &["byte 16", "promises 33554432 pixels", "are left"],
         ),
     ] {
-        let path = write(
-            folder.path(),
-            "a.png",
-            &gray16(width, height, false, &[0; 3]),
-        );
-        for error in [
-            read_depth_png(&path, 1.0).unwrap_err(),
-            read_mask_png(&path).unwrap_err(),
-            read_color(&path).unwrap_err(),
-        ] {
-            let text = message(&error);
-            for part in parts {
-                assert!(text.contains(part), "no {part:?} in: {text}");
-            }
-        }
+        let path = folder.write("a.png", gray16(width, height, false, &[0; 3]));
+        refused(read_depth_png(&path, 1.0), parts);
+        refused(read_mask_png(&path), parts);
+        refused(read_color(&path), parts);
     }
-    let path = folder.path().join("bomb.png");
+    let path = folder.path("bomb.png");
     let mut encoder = Encoder::new(std::fs::File::create(&path).unwrap(), 4096, 4096);
     encoder.set_color(ColorType::Grayscale);
     encoder.set_depth(BitDepth::Sixteen);
@@ -225,24 +182,10 @@ fn decompression_bombs_are_refused_by_their_headers() {
     writer.write_image_data(&vec![0; 4096 * 4096 * 2]).unwrap();
     writer.finish().unwrap();
     assert!(std::fs::metadata(&path).unwrap().len() < 200_000);
-    let limits = ReadLimits {
-        max_pixels: 4096 * 4096 - 1,
-        ..ReadLimits::DEFAULT
-    };
-    assert!(matches!(
-        limits.read_depth_png(&path, 1.0),
-        Err(IoError {
-            kind: IoErrorKind::Limit,
-            ..
-        })
-    ));
-    assert!(matches!(
-        limits.read_mask_png(&path),
-        Err(IoError {
-            kind: IoErrorKind::Limit,
-            ..
-        })
-    ));
+    let limits = limits(|limits| limits.max_pixels = 4096 * 4096 - 1);
+    let depth = limits.read_depth_png(&path, 1.0).unwrap_err();
+    let mask = limits.read_mask_png(&path).unwrap_err();
+    assert_eq!([depth.kind, mask.kind], [IoErrorKind::Limit; 2]);
     assert_eq!(
         read_depth_png(&path, 1.0).unwrap().pixels().len(),
         4096 * 4096
@@ -251,7 +194,7 @@ fn decompression_bombs_are_refused_by_their_headers() {
 
 #[test]
 fn data_that_do_not_fit_the_header_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let row = |width: usize| [vec![0], vec![1; 2 * width]].concat();
     for (width, height, rows) in [
         (4, 4, row(4).repeat(3)),
@@ -261,26 +204,22 @@ fn data_that_do_not_fit_the_header_are_refused() {
         // A filter type that does not exist.
         (1, 1, vec![9, 0, 1]),
     ] {
-        let path = write(folder.path(), "a.png", &gray16(width, height, false, &rows));
+        let path = folder.write("a.png", gray16(width, height, false, &rows));
         let error = read_depth_png(&path, 1.0).unwrap_err();
-        assert!(
-            matches!(error, IoError { ref expected, .. } if expected == "a PNG image"),
-            "{width}x{height}: {}",
-            message(&error)
-        );
+        assert_eq!(error.expected, "a PNG image", "{width}x{height}");
     }
-    let other = write(folder.path(), "a.png", b"P5 64 64 65535");
+    let other = folder.write("a.png", b"P5 64 64 65535");
     let error = read_depth_png(other, 1.0).unwrap_err();
     assert_eq!(error.expected, "a PNG image");
     // A file with any one damaged byte gives an image or an error.
     let depth = hicp_core::DepthImage::from_meters(5, 4, vec![0.5; 20]).unwrap();
-    let path = folder.path().join("a.png");
+    let path = folder.path("a.png");
     write_depth_png(&path, &depth, 1.0).unwrap();
     let whole = std::fs::read(&path).unwrap();
     for at in 0..whole.len() {
         let mut damaged = whole.clone();
         damaged[at] ^= 0xff;
-        match read_depth_png(write(folder.path(), "a.png", &damaged), 1.0) {
+        match read_depth_png(folder.write("a.png", &damaged), 1.0) {
             Ok(image) => assert_eq!(
                 image.pixels(),
                 depth.pixels(),

@@ -1,9 +1,10 @@
 //! Depth images and masks that other programs wrote (`tests/fixtures/make.py`).
 
+use hicp_core::Mask;
 use hicp_io::bop::Scene;
 use hicp_io::{MaskRule, read_depth, read_mask};
 
-use crate::common::fixture;
+use crate::common::{Folder, assert_contains, fixture, refused};
 
 /// The depth at every pixel, meters.
 fn expected(index: usize) -> f32 {
@@ -35,11 +36,8 @@ fn integers_of_every_format_have_a_unit() {
         "depth_i64.npy",
     ] {
         check_depth(name, Some(1.0), 1e-6);
-        let error = read_depth(fixture(name), None).unwrap_err().to_string();
-        assert!(
-            error.contains("found integers") && error.contains("--depth-scale"),
-            "{error}"
-        );
+        let without_unit = read_depth(fixture(name), None);
+        refused(without_unit, &["found integers", "--depth-scale"]);
     }
 }
 
@@ -91,18 +89,16 @@ fn files_that_cannot_be_depth_are_refused_with_advice() {
         ("mask_bool.npy", "1-bit gray pixels", "16-bit gray"),
         ("make.py", "data of an unknown format", "np.fromfile"),
     ] {
-        let error = read_depth(fixture(name), Some(1.0))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains(name) && error.contains(found) && error.contains(advice),
-            "{error}"
-        );
+        refused(read_depth(fixture(name), Some(1.0)), &[name, found, advice]);
     }
 }
 
-fn object(index: usize) -> bool {
-    index % 5 >= 2
+/// Asserts that a mask selects the object, without a warning.
+fn check_mask(name: &str, rule: MaskRule) {
+    let file = read_mask(fixture(name), rule).unwrap();
+    let expected = (0..20).map(|index| index % 5 >= 2).collect();
+    assert_eq!(file.mask, Mask::new(5, 4, expected).unwrap(), "{name}");
+    assert_eq!(file.warning, None, "{name}");
 }
 
 #[test]
@@ -122,17 +118,7 @@ fn masks_of_two_values_need_no_option() {
         "mask_bool.npy",
         "mask_u8_channel.npy",
     ] {
-        let file = read_mask(fixture(name), MaskRule::NotZero).unwrap();
-        assert_eq!((file.mask.width(), file.mask.height()), (5, 4), "{name}");
-        assert!(
-            file.mask
-                .pixels()
-                .iter()
-                .enumerate()
-                .all(|(i, set)| *set == object(i)),
-            "{name}"
-        );
-        assert_eq!(file.warning, None, "{name}");
+        check_mask(name, MaskRule::NotZero);
     }
 }
 
@@ -157,12 +143,9 @@ fn masks_of_more_values_are_read_with_a_warning_that_names_the_options() {
     ] {
         let file = read_mask(fixture(name), MaskRule::NotZero).unwrap();
         let warning = file.warning.unwrap_or_else(|| panic!("{name}: no warning"));
-        assert!(warning.contains(values), "{name}: {warning}");
-        assert!(
-            warning.contains(&format!("--mask-threshold {threshold} ")),
-            "{warning}"
-        );
-        assert!(warning.contains("--mask-value") && file.threshold == threshold);
+        let option = format!("--mask-threshold {threshold} ");
+        assert_contains(&warning, &[values, &option, "--mask-value"]);
+        assert_eq!(file.threshold, threshold, "{name}");
     }
 }
 
@@ -175,29 +158,16 @@ fn a_threshold_or_a_value_selects_the_object() {
         ("mask_labels.png", MaskRule::Equal(3.0)),
         ("mask_palette.png", MaskRule::Equal(3.0)),
     ] {
-        let file = read_mask(fixture(name), rule).unwrap();
-        assert!(
-            file.mask
-                .pixels()
-                .iter()
-                .enumerate()
-                .all(|(i, set)| *set == object(i)),
-            "{name}"
-        );
-        assert_eq!(file.warning, None, "{name}");
+        check_mask(name, rule);
     }
-    let error = read_mask(fixture("mask_labels.png"), MaskRule::Equal(7.0)).unwrap_err();
-    let text = error.to_string();
-    assert!(
-        text.contains("a value 7,") && text.contains("the values 0, 1 and 3"),
-        "{text}"
-    );
+    let other = read_mask(fixture("mask_labels.png"), MaskRule::Equal(7.0));
+    refused(other, &["a value 7,", "the values 0, 1 and 3"]);
 }
 
 /// A truncated file, and a file with one changed byte, gives an image or an error.
 #[test]
 fn damaged_files_never_panic() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let fixtures = std::fs::read_dir(fixture("")).unwrap();
     for entry in fixtures.flatten().map(|entry| entry.path()) {
         let whole = std::fs::read(&entry).unwrap();
@@ -206,16 +176,11 @@ fn damaged_files_never_panic() {
         if !(name.starts_with("depth") || name.starts_with("mask")) || name.ends_with("png") {
             continue;
         }
-        let path = folder.path().join(name);
         let read = |content: &[u8]| {
-            std::fs::write(&path, content).unwrap();
-            for error in [
-                read_depth(&path, Some(1.0)).err(),
-                read_mask(&path, MaskRule::NotZero).err(),
-            ]
-            .into_iter()
-            .flatten()
-            {
+            let path = folder.write(&name, content);
+            let depth = read_depth(&path, Some(1.0)).err();
+            let mask = read_mask(&path, MaskRule::NotZero).err();
+            for error in depth.iter().chain(&mask) {
                 assert!(error.to_string().len() < 1000, "{error}");
             }
         };
@@ -274,30 +239,21 @@ fn a_real_frame_is_the_same_in_every_format() {
         ("graspnet6dof_cheezit.npy", "a pickled array"),
         ("kinect_frame_20121214T142255.814212_depth.pclzf", "PCLZF"),
     ] {
-        let error = read_depth(folder.join(name), Some(1.0))
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains(found), "{error}");
+        refused(read_depth(folder.join(name), Some(1.0)), &[found]);
     }
 }
 
 #[test]
 fn scenes_of_bop_may_have_depth_as_tiff() {
-    let dir = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let camera = r#"{"1": {"cam_K": [600,0,2,0,600,2,0,0,1], "depth_scale": 1.0}}"#;
-    std::fs::write(dir.path().join("scene_camera.json"), camera).unwrap();
-    std::fs::create_dir(dir.path().join("depth")).unwrap();
-    for extension in ["tif", "tiff"] {
-        let path = dir
-            .path()
-            .join("depth/000001.png")
-            .with_extension(extension);
-        std::fs::copy(fixture("depth_u16_big_endian.tiff"), &path).unwrap();
-        let depth = Scene::open(dir.path()).unwrap().read_depth(1).unwrap();
-        assert_eq!(
-            depth,
-            read_depth(fixture("depth_u16.tiff"), Some(1.0)).unwrap()
-        );
+    folder.write("scene_camera.json", camera);
+    let content = std::fs::read(fixture("depth_u16_big_endian.tiff")).unwrap();
+    let expected = read_depth(fixture("depth_u16.tiff"), Some(1.0)).unwrap();
+    for name in ["depth/000001.tif", "depth/000001.tiff"] {
+        let path = folder.write(name, &content);
+        let scene = Scene::open(folder.root()).unwrap();
+        assert_eq!(scene.read_depth(1).unwrap(), expected);
         std::fs::remove_file(path).unwrap();
     }
 }

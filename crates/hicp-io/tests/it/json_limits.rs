@@ -1,39 +1,16 @@
 //! JSON files above their limits: each is refused by its size before it is parsed.
 
-use std::path::{Path, PathBuf};
-
 use hicp_io::bop::{Dataset, Scene};
 use hicp_io::{IoError, IoErrorKind, ReadLimits, read_camera_json, read_pose_json};
 
-/// Creates a file with a given text, followed by zeros that occupy no disk space.
-fn sparse(folder: &Path, name: &str, text: &str, bytes: u64) -> PathBuf {
-    let path = folder.join(name);
-    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-    std::fs::write(&path, text).unwrap();
-    let file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
-    file.set_len(bytes).unwrap();
-    path
-}
+use crate::common::{Folder, limits, refused};
 
 #[track_caller]
 fn above<T>(result: Result<T, IoError>, wanted_field: &str, bytes: u64, most: u64) {
-    match result.map(|_| ()) {
-        Err(
-            error @ IoError {
-                kind: IoErrorKind::Limit,
-                ..
-            },
-        ) => {
-            let message = error.to_string();
-            let numbers = format!("found {bytes} bytes, expected at most {most}");
-            let option = format!("--{} N", wanted_field.replace('_', "-"));
-            assert!(
-                message.contains(&numbers) && message.contains(&option),
-                "{message}"
-            );
-        }
-        other => panic!("{other:?}"),
-    }
+    let numbers = format!("found {bytes} bytes, expected at most {most}");
+    let option = format!("--{} N", wanted_field.replace('_', "-"));
+    let error = refused(result, &[&numbers, &option]);
+    assert_eq!(error.kind, IoErrorKind::Limit);
 }
 
 const POSE: &str = r#"{"cam_R_m2c": [1,0,0,0,1,0,0,0,1], "cam_t_m2c": [0,0,500]}"#;
@@ -41,26 +18,22 @@ const CAMERA: &str = r#"{"cam_K": [500,0,3,0,500,3,0,0,1]}"#;
 
 #[test]
 fn files_of_a_pose_or_a_camera_have_a_small_limit() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let most = ReadLimits::DEFAULT.max_small_json_bytes;
-    let pose = sparse(folder.path(), "pose.json", POSE, most + 1);
+    let pose = folder.sparse("pose.json", POSE, most + 1);
     above(
         read_pose_json(&pose),
         "max_small_json_bytes",
         most + 1,
         most,
     );
-    let camera = sparse(folder.path(), "camera.json", CAMERA, 1 << 40);
+    let camera = folder.sparse("camera.json", CAMERA, 1 << 40);
     let read = read_camera_json(&camera, (8, 6));
     above(read, "max_small_json_bytes", 1 << 40, most);
     // At the default limit, and at a custom one.
     for (text, bytes) in [(POSE, POSE.len()), (CAMERA, CAMERA.len())] {
-        let path = folder.path().join("exact.json");
-        std::fs::write(&path, text).unwrap();
-        let limits = |max_small_json_bytes| ReadLimits {
-            max_small_json_bytes,
-            ..ReadLimits::DEFAULT
-        };
+        let path = folder.write("exact.json", text);
+        let limits = |bytes| limits(|limits| limits.max_small_json_bytes = bytes);
         let read = |limits: ReadLimits| match text {
             POSE => limits.read_pose_json(&path).map(|_| ()),
             _ => limits.read_camera_json(&path, (8, 6)).map(|_| ()),
@@ -88,13 +61,12 @@ fn every_annotation_file_of_a_dataset_is_limited() {
         ("models/models_info.json", "{}"),
         ("test_targets_bop19.json", "[]"),
     ];
-    let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| sparse(folder.path(), name, text, text.len() as u64);
+    let folder = Folder::new();
     for (name, text) in FILES {
-        write(name, text);
+        folder.write(name, text);
     }
     let read_all = |limits: ReadLimits| {
-        let dataset = Dataset::open(folder.path()).unwrap().with_limits(limits);
+        let dataset = Dataset::open(folder.root()).unwrap().with_limits(limits);
         dataset.scene("test", 1)?;
         dataset.read_models_info()?;
         dataset.read_targets().map(|_| ())
@@ -102,20 +74,17 @@ fn every_annotation_file_of_a_dataset_is_limited() {
     read_all(ReadLimits::DEFAULT).unwrap();
     let most = ReadLimits::DEFAULT.max_json_bytes;
     for (name, text) in FILES {
-        sparse(folder.path(), name, text, most + 1);
+        folder.sparse(name, text, most + 1);
         above(
             read_all(ReadLimits::DEFAULT),
             "max_json_bytes",
             most + 1,
             most,
         );
-        write(name, text);
+        folder.write(name, text);
     }
     let longest = FILES[0].1.len() as u64;
-    let limits = |max_json_bytes| ReadLimits {
-        max_json_bytes,
-        ..ReadLimits::DEFAULT
-    };
+    let limits = |bytes| limits(|limits| limits.max_json_bytes = bytes);
     assert!(read_all(limits(longest)).is_ok());
     above(
         read_all(limits(longest - 1)),
@@ -123,7 +92,7 @@ fn every_annotation_file_of_a_dataset_is_limited() {
         longest,
         longest - 1,
     );
-    let scene = folder.path().join("test/000001");
+    let scene = folder.path("test/000001");
     above(
         Scene::open_within(limits(10), &scene, None),
         "max_json_bytes",

@@ -5,6 +5,8 @@ use std::path::Path;
 use hicp_core::SurfaceColor;
 use hicp_io::{LengthUnit, MeshFile, ReadLimits};
 
+use crate::common::{Folder, assert_contains};
+
 fn read(path: &Path) -> MeshFile {
     let read = ReadLimits::DEFAULT.read_mesh_file(path, LengthUnit::Meters);
     read.unwrap()
@@ -12,8 +14,6 @@ fn read(path: &Path) -> MeshFile {
 
 /// Reads the text of a PLY triangle whose vertices have these properties after their position.
 fn ply(properties: &str, values: [&str; 3]) -> MeshFile {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.ply");
     let names = properties.replace(' ', "\nproperty ").replace(':', " ");
     let [a, b, c] = values;
     let text = format!(
@@ -22,7 +22,8 @@ fn ply(properties: &str, values: [&str; 3]) -> MeshFile {
          property list uchar int vertex_indices\nend_header\n\
          0 0 0 {a}\n1 0 0 {b}\n0 1 0 {c}\n3 0 1 2\n"
     );
-    std::fs::write(&path, text).unwrap();
+    let folder = Folder::new();
+    let path = folder.write("a.ply", text);
     let geometry = ReadLimits::DEFAULT.read_mesh_geometry(&path, LengthUnit::Meters);
     assert!(geometry.unwrap().color().is_none());
     read(&path)
@@ -63,10 +64,7 @@ fn unusable_ply_colors_leave_the_mesh_without_color_and_are_reported() {
     let MeshFile { mesh, color_fault } = ply(properties, ["0 0 0", "0 nan 0", "0 0 0"]);
     assert!(mesh.color().is_none());
     let fault = color_fault.unwrap().to_string();
-    assert!(
-        fault.contains("vertex 1") && fault.contains("a.ply"),
-        "{fault}"
-    );
+    assert_contains(&fault, &["vertex 1", "a.ply"]);
     let MeshFile { mesh, color_fault } = ply(properties, ["0 0 0", "0 red 0", "0 0 0"]);
     assert!(mesh.color().is_none() && color_fault.is_some());
     // Two of three channels are no color.

@@ -3,11 +3,13 @@
 //! The mesh is the unit square. Its texture is red at the upper left, green at the upper right,
 //! blue at the lower left, and white at the lower right.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use hicp_core::{Point3, TriMesh, sample_colored_surface};
 use hicp_io::bop::Dataset;
 use hicp_io::{LengthUnit, MeshFile, ReadLimits, read_mesh, write_rgb_png};
+
+use crate::common::{Folder, assert_contains, limits};
 
 const RED: [u8; 3] = [250, 0, 0];
 const GREEN: [u8; 3] = [0, 250, 0];
@@ -15,25 +17,12 @@ const BLUE: [u8; 3] = [0, 0, 250];
 const WHITE: [u8; 3] = [250; 3];
 const CORNERS: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    /// Creates a folder with the texture as `a b.png`.
-    fn new() -> Self {
-        let folder = Self(tempfile::tempdir().unwrap());
-        let rgb = [RED, GREEN, BLUE, WHITE].as_flattened().to_vec();
-        write_rgb_png(folder.path("a b.png"), 2, 2, &rgb).unwrap();
-        folder
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-        std::fs::write(self.path(name), content).unwrap();
-        self.path(name)
-    }
+/// Creates a folder with the texture as `a b.png`.
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let rgb = [RED, GREEN, BLUE, WHITE].as_flattened().to_vec();
+    write_rgb_png(folder.path("a b.png"), 2, 2, &rgb).unwrap();
+    folder
 }
 
 fn read(path: &Path) -> MeshFile {
@@ -92,7 +81,7 @@ const OBJ: &str = "mtllib some.mtl\nv 9 9 9\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\
 
 #[test]
 fn obj_textures_cover_polygons_and_triangles() {
-    let folder = Folder::new();
+    let folder = folder();
     let mtl = "# two materials\nnewmtl picture\nKd 0 0 0\nmap_Kd -clamp on x.png\nmap_Kd a b.png\n\
         newmtl plain\nKd 1 0.2 0\n";
     folder.write("some.mtl", mtl);
@@ -117,7 +106,7 @@ fn obj_textures_cover_polygons_and_triangles() {
 
 #[test]
 fn obj_vertex_colors_follow_their_vertices() {
-    let folder = Folder::new();
+    let folder = folder();
     let text = "v 9 9 9 0 0 0\nv 0 1 0 0 0 1\nv 1 1 0 0 1 0\nv 0 0 0 1 0 0\nf 4 3 2\n";
     let file = read(&folder.write("a.obj", text));
     assert!(file.color_fault.is_none());
@@ -132,7 +121,7 @@ fn obj_vertex_colors_follow_their_vertices() {
 
 #[test]
 fn ply_textures_are_read_by_vertex_and_by_face() {
-    let folder = Folder::new();
+    let folder = folder();
     let head = |vertex: &str, face: &str| {
         format!(
             "ply\nformat ascii 1.0\ncomment TextureFile a b.png\nelement vertex 4\n\
@@ -188,7 +177,7 @@ fn gltf(image: &str, factor: &str, bytes: usize) -> String {
 
 #[test]
 fn gltf_textures_come_from_files_and_buffers_and_have_a_factor() {
-    let folder = Folder::new();
+    let folder = folder();
     let picture = std::fs::read(folder.path("a b.png")).unwrap();
     let positions = CORNERS.iter().flat_map(|[x, y]| [*x, *y, 0.0]);
     // The origin of the texture is its upper left corner.
@@ -234,15 +223,13 @@ fn gltf_textures_come_from_files_and_buffers_and_have_a_factor() {
 
 #[test]
 fn unreadable_materials_and_textures_leave_the_mesh_without_color() {
-    let folder = Folder::new();
+    let folder = folder();
     let path = folder.write("a.obj", format!("{OBJ}f 2/2 3/3 4/4 5/5\n"));
     let fault = |parts: &[&str]| {
         let file = read(&path);
         assert!(file.mesh.color().is_none());
         let fault = file.color_fault.unwrap().to_string();
-        for part in parts {
-            assert!(fault.contains(part), "no {part:?} in: {fault}");
-        }
+        assert_contains(&fault, parts);
     };
     fault(&["a.obj", "material file", "some.mtl"]);
     folder.write("some.mtl", "newmtl other\nKd 1 1 1\n");
@@ -251,10 +238,7 @@ fn unreadable_materials_and_textures_leave_the_mesh_without_color() {
     fault(&["the texture \"no.png\""]);
     folder.write("no.png", "damaged");
     fault(&["the texture \"no.png\""]);
-    let limits = ReadLimits {
-        max_pixels: 4,
-        ..ReadLimits::DEFAULT
-    };
+    let limits = limits(|limits| limits.max_pixels = 4);
     folder.write("some.mtl", "newmtl picture\nmap_Kd a b.png\n");
     let file = limits.read_mesh_file(&path, LengthUnit::Meters).unwrap();
     assert!(file.color_fault.unwrap().found.contains("5 pixels"));

@@ -8,14 +8,14 @@ use hicp_io::bop::{ResultRow, read_results, results_from_csv, write_results};
 use hicp_io::{IoError, IoErrorKind, Place};
 use proptest::prelude::*;
 
+use crate::common::Folder;
+
 const HEADER: &str = "scene_id,im_id,obj_id,score,R,t,time";
 const EYE: &str = "1 0 0 0 1 0 0 0 1";
 
 fn read(text: impl AsRef<[u8]>) -> Result<Vec<ResultRow>, IoError> {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("a.csv");
-    std::fs::write(&path, text).unwrap();
-    read_results(&path)
+    let folder = Folder::new();
+    read_results(folder.write("a.csv", text))
 }
 
 proptest! {
@@ -31,8 +31,8 @@ proptest! {
             (row.score, row.time_s) = (score, time);
             row
         }).collect();
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.csv");
+        let folder = Folder::new();
+        let path = folder.path("a.csv");
         write_results(&path, &rows).unwrap();
         let back = read_results(&path).unwrap();
         prop_assert_eq!(back.len(), rows.len());
@@ -55,8 +55,8 @@ fn an_unchanged_row_keeps_its_numbers_and_a_new_pose_replaces_them() {
         "{HEADER}\n50,1,2,0.5,{rotation},0.1 0.2 1035.65777,-1\n"
     ))
     .unwrap();
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("out.csv");
+    let folder = Folder::new();
+    let path = folder.path("out.csv");
     write_results(&path, &rows).unwrap();
     assert_eq!(
         std::fs::read_to_string(&path).unwrap(),

@@ -2,28 +2,26 @@
 
 use super::*;
 
+type Tighten = fn(&mut ReadLimits);
+
 /// The test would hang if a reader waited for a writer of the pipe.
 #[cfg(unix)]
 #[test]
 fn only_regular_files_are_read() {
     let folder = Folder::new();
     let refused = |path: &Path, kind: &str| {
-        let text = message(&read_mesh(path, LengthUnit::Meters).unwrap_err());
-        assert!(
-            text.contains(kind) && text.contains("regular file"),
-            "{text}"
-        );
+        refused_mesh(path, &[kind, "regular file"]);
     };
-    let sub = folder.0.path().join("folder.ply");
+    let sub = folder.path("folder.ply");
     std::fs::create_dir(&sub).unwrap();
     refused(&sub, "a folder");
-    let socket = folder.0.path().join("socket.stl");
+    let socket = folder.path("socket.stl");
     let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
     refused(&socket, "a socket");
-    let link = folder.0.path().join("zero.obj");
+    let link = folder.path("zero.obj");
     std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
     refused(&link, "a device");
-    let pipe = folder.0.path().join("pipe.obj");
+    let pipe = folder.path("pipe.obj");
     match std::process::Command::new("mkfifo").arg(&pipe).status() {
         Ok(status) if status.success() => {
             refused(&pipe, "a pipe");
@@ -38,24 +36,20 @@ fn only_regular_files_are_read() {
 fn files_without_read_permission_are_refused() {
     use std::os::unix::fs::PermissionsExt;
     let folder = Folder::new();
-    let path = folder.file("a.obj", format!("{SQUARE}f 1 2 3\n"));
+    let path = folder.write("a.obj", format!("{SQUARE}f 1 2 3\n"));
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o000)).unwrap();
     if File::open(&path).is_ok() {
         println!("skipped: this user has permission to read every file");
         return;
     }
-    let text = message(&read_mesh(&path, LengthUnit::Meters).unwrap_err());
-    assert!(
-        text.contains("cannot read") && text.contains("ermission denied"),
-        "{text}"
-    );
+    refused_mesh(&path, &["cannot read", "ermission denied"]);
 }
 
 #[test]
 fn a_file_that_changes_constantly_is_read_unchanged_or_refused() {
     let folder = Folder::new();
     let texts = [10, 4000].map(|faces| format!("{SQUARE}{}", "f 1 2 3\n".repeat(faces)));
-    let path = folder.file("a.obj", &texts[0]);
+    let path = folder.write("a.obj", &texts[0]);
     let done = std::sync::atomic::AtomicBool::new(false);
     // Check the results after the writer has stopped; a panic before that would leave it running.
     let results: Vec<_> = std::thread::scope(|scope| {
@@ -91,60 +85,34 @@ fn a_file_that_changes_constantly_is_read_unchanged_or_refused() {
     println!("{refused} of 300 refused");
 }
 
-/// Creates a file with a given start, followed by zeros that occupy no disk space.
-fn sparse(folder: &Folder, name: &str, start: &[u8], bytes: u64) -> PathBuf {
-    let path = folder.file(name, start);
-    let file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
-    file.set_len(bytes).unwrap();
-    path
-}
-
 #[test]
 fn fifty_million_triangles_are_refused_by_their_header() {
     let folder = Folder::new();
     let count = 50_000_000_u32;
     let mut header = vec![0; 80];
     header.extend(count.to_le_bytes());
-    let path = sparse(&folder, "a.stl", &header, 84 + 50 * u64::from(count));
-    match read_mesh(&path, LengthUnit::Meters) {
-        Err(
-            error @ IoError {
-                kind: IoErrorKind::Limit,
-                ..
-            },
-        ) => {
-            let text = message(&error);
-            for part in [
-                "a.stl, byte 80",
-                "50000000 triangles",
-                "at most 10000000",
-                "--max-triangles",
-                "ReadLimits::max_triangles",
-            ] {
-                assert!(text.contains(part), "{text}");
-            }
-        }
-        other => panic!("{other:?}"),
-    }
+    let path = folder.sparse("a.stl", &header, 84 + 50 * u64::from(count));
+    let error = refused_mesh(
+        &path,
+        &[
+            "a.stl, byte 80",
+            "50000000 triangles",
+            "at most 10000000",
+            "--max-triangles",
+            "ReadLimits::max_triangles",
+        ],
+    );
+    assert_eq!(error.kind, IoErrorKind::Limit);
     let header = ply("binary_little_endian", "25000000", "50000000", "uchar int");
-    let path = sparse(
-        &folder,
-        "a.ply",
-        header.as_bytes(),
-        12 * 25_000_000 + 13 * 50_000_000,
+    let path = folder.sparse("a.ply", header, 12 * 25_000_000 + 13 * 50_000_000);
+    let error = refused_mesh(&path, &["line 3", "25000000 vertices"]);
+    assert_eq!(
+        (error.kind, error.place),
+        (IoErrorKind::Limit, Some(Place::Line(3)))
     );
-    assert!(matches!(
-        read_mesh(&path, LengthUnit::Meters),
-        Err(IoError { kind: IoErrorKind::Limit, place: Some(Place::Line(3)), found, .. })
-            if found == "25000000 vertices"
-    ));
     // The text formats do not announce their counts first, so the size of the file is limited.
-    let path = sparse(&folder, "a.obj", SQUARE.as_bytes(), 2 << 30);
-    let text = message(&read_mesh(&path, LengthUnit::Meters).unwrap_err());
-    assert!(
-        text.contains("2147483648 bytes") && text.contains("--max-file-bytes"),
-        "{text}"
-    );
+    let path = folder.sparse("a.obj", SQUARE, 2 << 30);
+    refused_mesh(&path, &["2147483648 bytes", "--max-file-bytes"]);
 }
 
 #[test]
@@ -155,10 +123,10 @@ fn limits_can_be_set() {
     let text =
         ply("ascii", "4", "2", "uchar int") + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n3 0 1 2\n";
     for path in [
-        folder.file("a.obj", faces),
-        folder.file("a.off", off),
-        folder.file("a.ply", text),
-        folder.file("a.stl", stl("", 3, 3)),
+        folder.write("a.obj", faces),
+        folder.write("a.off", off),
+        folder.write("a.ply", text),
+        folder.write("a.stl", stl("", 3, 3)),
     ] {
         let read = |limits: ReadLimits| limits.read_mesh(&path, LengthUnit::Meters);
         let bytes = std::fs::metadata(&path).unwrap().len();
@@ -170,68 +138,28 @@ fn limits_can_be_set() {
             ..ReadLimits::DEFAULT
         };
         assert_eq!(read(exact).unwrap().triangles().len(), 3);
-        for (tight, named) in [
-            (
-                ReadLimits {
-                    max_file_bytes: bytes - 1,
-                    ..exact
-                },
-                "max_file_bytes",
-            ),
-            (
-                ReadLimits {
-                    max_vertices: vertices - 1,
-                    ..exact
-                },
-                "max_vertices",
-            ),
-            (
-                ReadLimits {
-                    max_triangles: 2,
-                    ..exact
-                },
-                "max_triangles",
-            ),
-        ] {
-            match read(tight) {
-                Err(
-                    error @ IoError {
-                        kind: IoErrorKind::Limit,
-                        ..
-                    },
-                ) => {
-                    assert!(error.expected.contains(named), "{error}");
-                }
-                other => panic!("{}: {other:?}", path.display()),
-            }
+        let tight: [(&str, Tighten); 3] = [
+            ("max_file_bytes", |limits| limits.max_file_bytes -= 1),
+            ("max_vertices", |limits| limits.max_vertices -= 1),
+            ("max_triangles", |limits| limits.max_triangles -= 1),
+        ];
+        for (named, tighten) in tight {
+            let mut limits = exact;
+            tighten(&mut limits);
+            let error = common::refused(read(limits), &[named]);
+            assert_eq!(error.kind, IoErrorKind::Limit);
         }
     }
     let rows = format!(
         "scene_id,im_id,obj_id,score,R,t,time\n{}",
         "1,1,1,1,1 0 0 0 1 0 0 0 1,0 0 500,-1\n".repeat(3)
     );
-    let path = folder.file("a.csv", rows);
-    let limits = ReadLimits {
-        max_rows: 3,
-        ..ReadLimits::DEFAULT
-    };
-    assert_eq!(limits.read_results(&path).unwrap().len(), 3);
-    let text = message(
-        &ReadLimits {
-            max_rows: 2,
-            ..limits
-        }
-        .read_results(&path)
-        .unwrap_err(),
-    );
-    assert!(text.contains("line 4") && text.contains("3 rows"), "{text}");
-    let path = folder.file("a.json", "[]      ");
-    let limits = ReadLimits {
-        max_json_bytes: 7,
-        ..ReadLimits::DEFAULT
-    };
-    assert!(matches!(
-        limits.read_detections(&path),
-        Err(IoError { kind: IoErrorKind::Limit, expected, .. }) if expected.contains("max_json_bytes")
-    ));
+    let path = folder.write("a.csv", rows);
+    let of_rows = |most| common::limits(|limits| limits.max_rows = most).read_results(&path);
+    assert_eq!(of_rows(3).unwrap().len(), 3);
+    common::refused(of_rows(2), &["line 4", "3 rows"]);
+    let path = folder.write("a.json", "[]      ");
+    let limits = common::limits(|limits| limits.max_json_bytes = 7);
+    let error = common::refused(limits.read_detections(&path), &["max_json_bytes"]);
+    assert_eq!(error.kind, IoErrorKind::Limit);
 }

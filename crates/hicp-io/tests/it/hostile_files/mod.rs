@@ -4,60 +4,32 @@
 mod access;
 mod content;
 
-use hicp_io::{
-    IoError, IoErrorKind, LengthUnit, Place, ReadLimits, read_depth_png, read_mesh, read_pose_json,
-};
-use std::error::Error;
 use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-struct Folder(tempfile::TempDir);
+use hicp_io::{IoError, IoErrorKind, LengthUnit, Place, ReadLimits};
+use hicp_io::{read_depth_png, read_mesh, read_pose_json};
 
-impl Folder {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
+use crate::common::{self, Folder, message};
 
-    fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.path().join(name);
-        std::fs::write(&path, content).unwrap();
-        path
-    }
-}
-
-/// Returns the complete message of an error.
-fn message(error: &IoError) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text.push_str(": ");
-        text.push_str(&cause.to_string());
-        source = cause.source();
-    }
-    text
-}
-
+/// Asserts that a mesh file is refused with its name and all of these texts.
 #[track_caller]
 fn refused(name: &str, content: impl AsRef<[u8]>, parts: &[&str]) {
     let folder = Folder::new();
-    let path = folder.file(name, content);
-    let text = match read_mesh(&path, LengthUnit::Meters) {
-        Ok(mesh) => panic!("{name} was read: {} triangles", mesh.triangles().len()),
-        Err(error) => message(&error),
-    };
-    for part in [&[name], parts].concat() {
-        assert!(text.contains(part), "no {part:?} in: {text}");
-    }
+    refused_mesh(&folder.write(name, content), &[&[name], parts].concat());
+}
+
+#[track_caller]
+fn refused_mesh(path: &Path, parts: &[&str]) -> IoError {
+    common::refused(read_mesh(path, LengthUnit::Meters), parts)
 }
 
 #[track_caller]
 fn triangles(name: &str, content: impl AsRef<[u8]>) -> usize {
     let folder = Folder::new();
-    let path = folder.file(name, content);
-    match read_mesh(&path, LengthUnit::Meters) {
-        Ok(mesh) => mesh.triangles().len(),
-        Err(error) => panic!("{}", message(&error)),
-    }
+    let mesh = read_mesh(folder.write(name, content), LengthUnit::Meters);
+    let mesh = mesh.unwrap_or_else(|error| panic!("{}", message(&error)));
+    mesh.triangles().len()
 }
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
