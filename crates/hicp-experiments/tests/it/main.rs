@@ -3,6 +3,7 @@
 #![allow(clippy::panic, clippy::unwrap_used, reason = "helpers of tests")]
 
 mod claims;
+mod common;
 mod running;
 mod sequential;
 mod sizes_and_names;

@@ -1,17 +1,16 @@
 //! Runs of studies: streaming, resuming, pairing, and any number of threads.
 
 use std::ops::ControlFlow;
-use std::path::Path;
 
+use hicp_core::{Model, TriMesh};
 use hicp_experiments::{
     Config, Design, Experiment, ExperimentError, RunOptions, Study, Subject, Variant, run,
 };
+use hicp_io::LengthUnit;
 use hicp_sim::Household;
 use hybrid_icp::Preset;
 
-fn subjects() -> Vec<Subject> {
-    Subject::household(&[Household::Mug, Household::Book]).unwrap()
-}
+use crate::common::{Folder, assert_contains, refused, subjects};
 
 /// Creates a study without times and with a small camera.
 fn config(experiment: Experiment, presets: &[Preset], poses: u64) -> Config {
@@ -24,41 +23,23 @@ fn config(experiment: Experiment, presets: &[Preset], poses: u64) -> Config {
     config
 }
 
-fn go(config: &Config, folder: &Path, threads: usize, resume: bool) -> Result<(), ExperimentError> {
-    let options = RunOptions {
-        threads,
-        resume,
-        ..RunOptions::default()
-    };
-    run(config, &subjects(), folder, options, &mut |_| {
-        ControlFlow::Continue(())
-    })
-}
-
-fn bytes(folder: &Path) -> Vec<u8> {
-    std::fs::read(folder.join(Config::ROWS_FILE)).unwrap()
-}
-
+const ROWS: &str = Config::ROWS_FILE;
 const TWO: [Preset; 2] = [Preset::Hybrid, Preset::ProjectivePointToPlane];
 
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
     let config = config(Experiment::DepthNoise, &TWO, 3);
-    let (one, three) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    go(&config, one.path(), 1, false).unwrap();
-    go(&config, three.path(), 3, false).unwrap();
-    assert_eq!(bytes(one.path()), bytes(three.path()));
-    let rows = bytes(one.path()).iter().filter(|b| **b == b'\n').count();
+    let (one, three) = (Folder::with(&config, 1), Folder::with(&config, 3));
+    assert_eq!(one.bytes(ROWS), three.bytes(ROWS));
+    let rows = one.bytes(ROWS).iter().filter(|b| **b == b'\n').count();
     assert_eq!(rows, 1 + 2 * 3 * 6 * 2);
 }
 
 #[test]
 fn a_study_cut_anywhere_resumes_to_the_same_bytes() {
     let config = config(Experiment::InitNoise, &TWO, 4);
-    let folder = tempfile::tempdir().unwrap();
-    go(&config, folder.path(), 1, false).unwrap();
-    let whole = bytes(folder.path());
-    let file = folder.path().join(Config::ROWS_FILE);
+    let folder = Folder::with(&config, 1);
+    let whole = folder.bytes(ROWS);
     let second_line = whole.iter().position(|b| *b == b'\n').unwrap() + 1;
     for cut in [
         0,
@@ -69,10 +50,10 @@ fn a_study_cut_anywhere_resumes_to_the_same_bytes() {
         whole.len() - 1,
         whole.len(),
     ] {
-        std::fs::write(&file, &whole[..cut]).unwrap();
-        go(&config, folder.path(), 2, true).unwrap();
+        folder.write(ROWS, &whole[..cut]);
+        folder.run(&config, 2, true).unwrap();
         assert!(
-            bytes(folder.path()) == whole,
+            folder.bytes(ROWS) == whole,
             "cut at {cut} of {}",
             whole.len()
         );
@@ -82,13 +63,12 @@ fn a_study_cut_anywhere_resumes_to_the_same_bytes() {
 #[test]
 fn a_stopped_study_keeps_whole_cases_and_resumes() {
     let config = config(Experiment::DepthNoise, &TWO, 2);
-    let (whole, stopped) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    go(&config, whole.path(), 1, false).unwrap();
+    let (whole, stopped) = (Folder::with(&config, 1), Folder::new());
     let options = RunOptions {
         threads: 2,
         ..RunOptions::default()
     };
-    let outcome = run(&config, &subjects(), stopped.path(), options, &mut |done| {
+    let outcome = run(&config, &subjects(), stopped.root(), options, &mut |done| {
         if done == 2 {
             ControlFlow::Break(())
         } else {
@@ -99,20 +79,18 @@ fn a_stopped_study_keeps_whole_cases_and_resumes() {
         matches!(outcome, Err(ExperimentError::Stopped { cases: 2 })),
         "{outcome:?}"
     );
-    let part = bytes(stopped.path());
-    assert!(part.len() < bytes(whole.path()).len() && bytes(whole.path()).starts_with(&part));
-    assert_eq!(Study::read(stopped.path()).unwrap().rows.len(), 2 * 6 * 2);
-    go(&config, stopped.path(), 1, true).unwrap();
-    assert_eq!(bytes(stopped.path()), bytes(whole.path()));
+    let part = stopped.bytes(ROWS);
+    assert!(part.len() < whole.bytes(ROWS).len() && whole.bytes(ROWS).starts_with(&part));
+    assert_eq!(stopped.study::<Config>().rows.len(), 2 * 6 * 2);
+    stopped.run(&config, 1, true).unwrap();
+    assert_eq!(stopped.bytes(ROWS), whole.bytes(ROWS));
 }
 
 #[test]
 fn a_foreign_file_is_not_overwritten() {
     let config = config(Experiment::InitNoise, &TWO, 1);
-    let folder = tempfile::tempdir().unwrap();
-    go(&config, folder.path(), 1, false).unwrap();
-    let whole = bytes(folder.path());
-    let path = folder.path().join(Config::ROWS_FILE);
+    let folder = Folder::with(&config, 1);
+    let whole = folder.bytes(ROWS);
     let end = whole.iter().position(|byte| *byte == b'\n').unwrap();
     let mut other_column = whole.clone();
     other_column[end - 1] ^= 1;
@@ -124,20 +102,16 @@ fn a_foreign_file_is_not_overwritten() {
         &other_column,
         &[&whole[..end], b"\r\n"].concat(),
     ] {
-        std::fs::write(&path, foreign).unwrap();
-        let outcome = go(&config, folder.path(), 1, true).unwrap_err();
+        folder.write(ROWS, foreign);
+        let outcome = folder.run(&config, 1, true).unwrap_err();
         assert!(matches!(&outcome, ExperimentError::Io(_)), "{outcome}");
-        let outcome = outcome.to_string();
-        assert!(
-            outcome.contains("cases.csv") && outcome.contains("line 1"),
-            "{outcome}"
-        );
-        assert_eq!(bytes(folder.path()), foreign, "{outcome}");
+        assert_contains(&outcome.to_string(), &["cases.csv", "line 1"]);
+        assert_eq!(folder.bytes(ROWS), foreign, "{outcome}");
     }
     for left in [&b"\0\0\0"[..], &[&whole[..end / 2], b"\0\0"].concat()] {
-        std::fs::write(&path, left).unwrap();
-        go(&config, folder.path(), 1, true).unwrap();
-        assert!(bytes(folder.path()) == whole);
+        folder.write(ROWS, left);
+        folder.run(&config, 1, true).unwrap();
+        assert!(folder.bytes(ROWS) == whole);
     }
 }
 
@@ -145,12 +119,11 @@ fn a_foreign_file_is_not_overwritten() {
 fn stored_rows_are_kept_with_their_times() {
     let mut config = config(Experiment::InitNoise, &TWO, 2);
     config.times = true;
-    let folder = tempfile::tempdir().unwrap();
-    go(&config, folder.path(), 1, false).unwrap();
-    let whole = bytes(folder.path());
+    let folder = Folder::with(&config, 1);
+    let whole = folder.bytes(ROWS);
     let half = whole.len() / 2;
-    std::fs::write(folder.path().join(Config::ROWS_FILE), &whole[..half]).unwrap();
-    go(&config, folder.path(), 1, true).unwrap();
+    folder.write(ROWS, &whole[..half]);
+    folder.run(&config, 1, true).unwrap();
     // Of four cases with two rows each, the first one is complete before the middle.
     let kept: usize = whole
         .split_inclusive(|b| *b == b'\n')
@@ -158,9 +131,9 @@ fn stored_rows_are_kept_with_their_times() {
         .map(<[u8]>::len)
         .sum();
     assert!(kept < half);
-    assert_eq!(bytes(folder.path())[..kept], whole[..kept]);
-    let times = Study::read(folder.path())
-        .unwrap()
+    assert_eq!(folder.bytes(ROWS)[..kept], whole[..kept]);
+    let times = folder
+        .study::<Config>()
         .rows
         .into_iter()
         .map(|r| r.measured.unwrap().cpu_ms.unwrap());
@@ -171,29 +144,18 @@ fn stored_rows_are_kept_with_their_times() {
 #[test]
 fn another_study_in_the_folder_is_refused() {
     let config = config(Experiment::InitNoise, &TWO, 1);
-    let folder = tempfile::tempdir().unwrap();
-    go(&config, folder.path(), 1, false).unwrap();
-    let outcome = go(&config, folder.path(), 1, false)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        outcome.contains("cases.csv") && outcome.contains("--resume"),
-        "{outcome}"
-    );
+    let folder = Folder::with(&config, 1);
+    refused(folder.run(&config, 1, false), &["cases.csv", "--resume"]);
     let other = Config { seed: 4, ..config };
-    let outcome = go(&other, folder.path(), 1, true).unwrap_err().to_string();
-    assert!(
-        outcome.contains("\"seed\": 3") && outcome.contains("\"seed\": 4"),
-        "{outcome}"
-    );
+    let resumed = folder.run(&other, 1, true);
+    refused(resumed, &["\"seed\": 3", "\"seed\": 4"]);
 }
 
 #[test]
 fn every_variant_and_level_gets_the_same_start() {
     let config = config(Experiment::DepthNoise, &Preset::PAPER, 2);
-    let folder = tempfile::tempdir().unwrap();
-    go(&config, folder.path(), 2, false).unwrap();
-    let study = Study::read(folder.path()).unwrap();
+    let folder = Folder::with(&config, 2);
+    let study = folder.study::<Config>();
     let mut differing = 0;
     for case in study.rows.chunks_exact(6 * 9) {
         let first = case[0].measured.as_ref().unwrap();
@@ -209,14 +171,13 @@ fn every_variant_and_level_gets_the_same_start() {
 
     // The result of a variant for a case does not depend on the other variants.
     let alone = config_of(&study, &[Preset::NnPointToPlane]);
-    let other = tempfile::tempdir().unwrap();
-    go(&alone, other.path(), 1, false).unwrap();
+    let other = Folder::with(&alone, 1);
     let together: Vec<_> = study
         .rows
         .into_iter()
         .filter(|r| r.variant == "nn-point-to-plane")
         .collect();
-    assert_eq!(Study::read(other.path()).unwrap().rows, together);
+    assert_eq!(other.study::<Config>().rows, together);
 }
 
 fn config_of(study: &Study, presets: &[Preset]) -> Config {
@@ -226,9 +187,8 @@ fn config_of(study: &Study, presets: &[Preset]) -> Config {
 #[test]
 fn cases_cycle_through_the_bins() {
     let config = config(Experiment::InitNoise, &[Preset::ProjectivePointToPoint], 10);
-    let folder = tempfile::tempdir().unwrap();
-    go(&config, folder.path(), 2, false).unwrap();
-    for row in Study::read(folder.path()).unwrap().rows {
+    let folder = Folder::with(&config, 2);
+    for row in folder.study::<Config>().rows {
         let measured = row.measured.unwrap();
         let bin = row.bin.unwrap();
         assert_eq!(bin as u64, row.case);
@@ -253,9 +213,8 @@ fn a_case_that_cannot_be_created_has_a_reason_and_the_others_are_run() {
         config.camera.cx,
         config.camera.cy,
     ) = (28.0, 28.0, 15.5, 11.5);
-    let folder = tempfile::tempdir().unwrap();
-    go(&config, folder.path(), 2, false).unwrap();
-    let rows = Study::read(folder.path()).unwrap().rows;
+    let folder = Folder::with(&config, 2);
+    let rows = folder.study::<Config>().rows;
     assert_eq!(rows.len(), 2 * 2 * 2);
     for row in rows {
         // Two cases are spread over ten bins.
@@ -272,9 +231,8 @@ fn a_case_that_cannot_be_created_has_a_reason_and_the_others_are_run() {
 #[test]
 fn thresholds_change_the_results_of_hybrid() {
     let config = config(Experiment::Alpha, &[Preset::Hybrid], 6);
-    let folder = tempfile::tempdir().unwrap();
-    go(&config, folder.path(), 2, false).unwrap();
-    let rows = Study::read(folder.path()).unwrap().rows;
+    let folder = Folder::with(&config, 2);
+    let rows = folder.study::<Config>().rows;
     assert_eq!(rows.len(), 2 * 6 * 21);
     let of = |level: &str| -> Vec<f64> {
         let rows = rows.iter().filter(|r| r.setting == level);
@@ -290,59 +248,31 @@ fn thresholds_change_the_results_of_hybrid() {
 
 #[test]
 fn folders_and_names_are_checked() {
-    let folder = tempfile::tempdir().unwrap();
-    let outcome = Subject::read_folder(folder.path()).unwrap_err().to_string();
-    assert!(outcome.contains("found no mesh"), "{outcome}");
+    let folder = Folder::new();
+    refused(Subject::read_folder(folder.root()), &["found no mesh"]);
     let mug = Household::Mug.solid().to_mesh().unwrap();
-    hicp_io::write_ply(
-        folder.path().join("b.PLY"),
-        &mug,
-        hicp_io::LengthUnit::Meters,
-    )
-    .unwrap();
-    hicp_io::write_obj(
-        folder.path().join("a.obj"),
-        &mug,
-        hicp_io::LengthUnit::Meters,
-    )
-    .unwrap();
-    std::fs::write(folder.path().join("notes.txt"), "").unwrap();
-    let read = Subject::read_folder(folder.path()).unwrap();
-    assert_eq!(
-        read.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
-        ["a", "b"]
-    );
+    hicp_io::write_ply(folder.path("b.PLY"), &mug, LengthUnit::Meters).unwrap();
+    hicp_io::write_obj(folder.path("a.obj"), &mug, LengthUnit::Meters).unwrap();
+    folder.write("notes.txt", "");
+    let read = Subject::read_folder(folder.root()).unwrap();
+    let names: Vec<&str> = read.iter().map(|subject| &*subject.name).collect();
+    assert_eq!(names, ["a", "b"]);
 
-    let variants = [
-        Variant::preset(Preset::Hybrid),
-        Variant::preset(Preset::Hybrid),
-    ];
-    let outcome = Config::new(Experiment::Timing, &read, &variants, 1, 1)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        outcome.contains("variants: found \"hybrid\" twice"),
-        "{outcome}"
-    );
-    let outcome = Config::new(Experiment::Timing, &read, &variants[..1], 0, 1)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        outcome.contains("poses: found 0, expected 1 to 1000000"),
-        "{outcome}"
-    );
+    let timing = |subjects: &[Subject], presets: &[Preset], poses| {
+        let variants: Vec<Variant> = presets.iter().copied().map(Variant::preset).collect();
+        Config::new(Experiment::Timing, subjects, &variants, poses, 1)
+    };
+    let hybrid = Preset::Hybrid;
+    let twice = timing(&read, &[hybrid; 2], 1);
+    refused(twice, &["variants: found \"hybrid\" twice"]);
+    let none = timing(&read, &[hybrid], 0);
+    refused(none, &["poses: found 0, expected 1 to 1000000"]);
     let fixed = [Variant::preset(Preset::NnPointToPoint)];
     assert!(Config::new(Experiment::Alpha, &read, &fixed, 1, 1).is_err());
     let mut large = subjects();
-    large[0].model = hicp_core::Model::new(
-        hicp_core::TriMesh::new(
-            mug.vertices().iter().map(|p| p * 10.0).collect(),
-            mug.triangles().to_vec(),
-        )
-        .unwrap(),
-    );
-    let outcome = Config::new(Experiment::Timing, &large, &variants[..1], 1, 1)
-        .unwrap_err()
-        .to_string();
-    assert!(outcome.contains("objects[0].diameter_mm"), "{outcome}");
+    let vertices = mug.vertices().iter().map(|p| p * 10.0).collect();
+    let mesh = TriMesh::new(vertices, mug.triangles().to_vec()).unwrap();
+    large[0].model = Model::new(mesh);
+    let large = timing(&large, &[hybrid], 1);
+    refused(large, &["objects[0].diameter_mm"]);
 }

@@ -1,25 +1,26 @@
 //! The sequential study end to end: streaming, resuming, pairing, and any number of threads.
 
-use std::ops::ControlFlow;
-use std::path::Path;
-
 use hicp_experiments::{
-    Design, ExperimentError, FusionRule, Metric, Panel, PathDirection, Row, RunOptions, Subject,
-    TrajectoryClock, TrajectoryConfig, TrajectoryReport, TrajectoryStudy, run,
+    Design, FusionRule, Metric, Panel, PathDirection, Row, Subject, TrajectoryClock,
+    TrajectoryConfig, TrajectoryReport,
 };
 use hicp_sim::Household;
 use hybrid_icp::{Preset, WithoutPairs};
 
+use crate::common::{Folder, assert_contains, refused};
+
 const BOTH: [Preset; 2] = [Preset::Hybrid, Preset::ProjectiveCascadePointPlane];
 
-fn subjects() -> Vec<Subject> {
+const ROWS: &str = TrajectoryConfig::ROWS_FILE;
+
+fn mug() -> Vec<Subject> {
     Subject::household(&[Household::Mug]).unwrap()
 }
 
 /// Creates a study of one short trajectory per bin, with a small camera and a coarse
 /// reconstruction.
 fn config() -> TrajectoryConfig {
-    let mut config = TrajectoryConfig::new(&subjects(), &BOTH, 1, 3)
+    let mut config = TrajectoryConfig::new(&mug(), &BOTH, 1, 3)
         .unwrap()
         .improved();
     let camera = &mut config.camera;
@@ -34,31 +35,11 @@ fn config() -> TrajectoryConfig {
     config
 }
 
-fn go(
-    config: &TrajectoryConfig,
-    folder: &Path,
-    threads: usize,
-    resume: bool,
-) -> Result<(), ExperimentError> {
-    let options = RunOptions {
-        threads,
-        resume,
-        ..RunOptions::default()
-    };
-    run(config, &subjects(), folder, options, &mut |_| {
-        ControlFlow::Continue(())
-    })
-}
-
-fn bytes(folder: &Path) -> Vec<u8> {
-    std::fs::read(folder.join(TrajectoryConfig::ROWS_FILE)).unwrap()
-}
-
 #[test]
 fn a_small_study_runs_to_its_report() {
-    let (config, folder) = (config(), tempfile::tempdir().unwrap());
-    go(&config, folder.path(), 2, false).unwrap();
-    let study = TrajectoryStudy::read(folder.path()).unwrap();
+    let config = config();
+    let folder = Folder::with(&config, 2);
+    let study = folder.study::<TrajectoryConfig>();
     assert_eq!(study.rows.len(), 10 * 2 * FusionRule::ALL.len());
     for row in &study.rows {
         let measured = row.measured.as_ref().unwrap();
@@ -94,17 +75,18 @@ fn a_small_study_runs_to_its_report() {
     let curves = |row: &Vec<Panel>| row.iter().map(|p| p.curves.len()).collect::<Vec<_>>();
     let curves: Vec<Vec<usize>> = figure.rows.iter().map(curves).collect();
     assert_eq!(curves, [[6, 6], [5, 5]]);
-    report.write(folder.path()).unwrap();
-    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
-    for part in [
-        "<svg",
-        "post-trajectory VSD",
-        "gated-weighted-average",
-        "calibrated-weighted-average",
-        "average is at least as good",
-    ] {
-        assert!(html.contains(part), "{part}");
-    }
+    report.write(folder.root()).unwrap();
+    let html = folder.text("report.html");
+    assert_contains(
+        &html,
+        &[
+            "<svg",
+            "post-trajectory VSD",
+            "gated-weighted-average",
+            "calibrated-weighted-average",
+            "average is at least as good",
+        ],
+    );
     for file in [
         "figure.svg",
         "figure.png",
@@ -113,44 +95,37 @@ fn a_small_study_runs_to_its_report() {
         "claims.csv",
         "calibration.csv",
     ] {
-        assert!(folder.path().join(file).metadata().unwrap().len() > 100);
+        assert!(folder.path(file).metadata().unwrap().len() > 100);
     }
 }
 
 #[test]
 fn threads_and_interruptions_do_not_change_the_rows() {
-    let (config, one) = (config(), tempfile::tempdir().unwrap());
-    go(&config, one.path(), 1, false).unwrap();
-    let whole = bytes(one.path());
-    let two = tempfile::tempdir().unwrap();
-    go(&config, two.path(), 2, false).unwrap();
-    assert_eq!(bytes(two.path()), whole);
+    let config = config();
+    let whole = Folder::with(&config, 1).bytes(ROWS);
+    let two = Folder::with(&config, 2);
+    assert_eq!(two.bytes(ROWS), whole);
     // Cut in the header, between trajectories, and within one.
-    let file = two.path().join(TrajectoryConfig::ROWS_FILE);
     for cut in [5, whole.len() / 2, whole.len() - 7] {
-        std::fs::write(&file, &whole[..cut]).unwrap();
-        go(&config, two.path(), 2, true).unwrap();
-        assert_eq!(bytes(two.path()), whole, "cut at {cut}");
+        two.write(ROWS, &whole[..cut]);
+        two.run(&config, 2, true).unwrap();
+        assert_eq!(two.bytes(ROWS), whole, "cut at {cut}");
     }
     // Existing rows are not overwritten, and another study does not continue them.
-    let again = go(&config, two.path(), 1, false);
-    assert!(again.unwrap_err().to_string().contains("or --resume"));
+    refused(two.run(&config, 1, false), &["or --resume"]);
     let mut other = config.clone();
     other.underlying[0].seconds_per_estimate = 0.3;
-    let other = go(&other, two.path(), 1, true);
-    let other = other.unwrap_err().to_string();
-    assert!(other.contains("\"seconds_per_estimate\": 0.3"), "{other}");
+    let resumed = two.run(&other, 1, true);
+    refused(resumed, &["\"seconds_per_estimate\": 0.3"]);
 }
 
 #[test]
 fn pipelines_of_one_study_share_paths_and_starts() {
-    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
     let both = config();
-    go(&both, folders[0].path(), 2, false).unwrap();
     let mut alone = both.clone();
     alone.underlying.remove(0);
-    go(&alone, folders[1].path(), 2, false).unwrap();
-    let [both, alone] = folders.map(|f| TrajectoryStudy::read(f.path()).unwrap().rows);
+    let rows = |config| Folder::with(config, 2).study::<TrajectoryConfig>().rows;
+    let [both, alone] = [&both, &alone].map(rows);
     let expected: Vec<_> = both
         .into_iter()
         .filter(|row| row.setting == BOTH[1].name())
@@ -160,13 +135,13 @@ fn pipelines_of_one_study_share_paths_and_starts() {
 
 #[test]
 fn with_the_real_clock_every_method_runs_to_the_end() {
-    let (mut config, folder) = (config(), tempfile::tempdir().unwrap());
+    let mut config = config();
     config.clock = TrajectoryClock::Real;
     config.methods = vec!["last-estimate".to_owned(), "average".to_owned()];
     // The camera is so fast that the path ends after a few images on any machine.
     config.speed_m_s = 20.0;
-    go(&config, folder.path(), 2, false).unwrap();
-    let study = TrajectoryStudy::read(folder.path()).unwrap();
+    let folder = Folder::with(&config, 2);
+    let study = folder.study::<TrajectoryConfig>();
     assert_eq!(study.config.clock, TrajectoryClock::Real);
     assert_eq!(study.rows.len(), 10 * 2 * 2);
     for row in &study.rows {
@@ -185,22 +160,22 @@ fn with_the_real_clock_every_method_runs_to_the_end() {
             .any(|row| row.measured.as_ref().is_some_and(|m| m.steps > 0))
     );
     let report = TrajectoryReport::of(vec![("sequential".to_owned(), study)]);
-    report.write(folder.path()).unwrap();
-    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    report.write(folder.root()).unwrap();
+    let html = folder.text("report.html");
     assert!(html.contains("no run repeats this one"));
 }
 
 #[test]
 fn methods_that_need_an_mve_see_fewer_images() {
-    let (mut config, folder) = (config(), tempfile::tempdir().unwrap());
+    let mut config = config();
     config.methods = vec!["average".to_owned(), "weighted-average".to_owned()];
     config.underlying.truncate(1);
     (
         config.underlying[0].seconds_per_estimate,
         config.underlying[0].seconds_per_mve,
     ) = (0.3, 0.3);
-    go(&config, folder.path(), 2, false).unwrap();
-    let study = TrajectoryStudy::read(folder.path()).unwrap();
+    let folder = Folder::with(&config, 2);
+    let study = folder.study::<TrajectoryConfig>();
     // 12 cm at 0.1 m/s: an image every 3 cm, and with an MVE every 6 cm.
     let steps = |row: &Row| row.measured.as_ref().map(|m| m.steps);
     let steps: Vec<_> = study.rows.iter().map(steps).collect();
@@ -224,8 +199,7 @@ fn a_field_is_changed_by_name() {
         ("speed_m_s=-1", "speed_m_s"),
         ("depth_noise=d435", "a noise"),
     ] {
-        let error = config.with(change).unwrap_err().to_string();
-        assert!(error.contains(part), "{error}");
+        refused(config.with(change), &[part]);
     }
 }
 
@@ -234,8 +208,8 @@ fn configurations_that_cannot_be_run_are_refused() {
     let refused = |subjects: &[Subject], n, presets: &[Preset]| {
         TrajectoryConfig::new(subjects, presets, n, 1)
     };
-    assert!(refused(&subjects(), 0, &BOTH).is_err());
-    assert!(refused(&subjects(), 1, &[]).is_err());
-    assert!(refused(&subjects(), 1, &[BOTH[0], BOTH[0]]).is_err());
+    assert!(refused(&mug(), 0, &BOTH).is_err());
+    assert!(refused(&mug(), 1, &[]).is_err());
+    assert!(refused(&mug(), 1, &[BOTH[0], BOTH[0]]).is_err());
     assert!(refused(&[], 1, &BOTH).is_err());
 }

@@ -2,16 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use hicp_experiments::{
-    Config, Design, Experiment, FusionRule, Subject, TrajectoryConfig, Variant,
-};
-use hicp_sim::Household;
+use hicp_experiments::{Config, Design, Experiment, FusionRule, TrajectoryConfig, Variant};
 use hybrid_icp::Preset;
 use hybrid_icp::pipeline::PipelineLimits;
 
-fn subjects() -> Vec<Subject> {
-    Subject::household(&[Household::Mug, Household::Book]).unwrap()
-}
+use crate::common::{Folder, subjects};
 
 #[test]
 fn cases_are_per_object_and_rows_per_level_and_variant() {
@@ -60,17 +55,14 @@ fn fusion_rules_are_found_by_their_names() {
 
 #[test]
 fn a_variant_from_a_file_has_its_name_and_is_a_pipeline() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("mine.toml");
+    let folder = Folder::new();
+    let read = |name| Variant::read_within(&PipelineLimits::DEFAULT, &folder.path(name));
     let preset = Variant::preset(Preset::Hybrid);
-    std::fs::write(&file, &preset.toml).unwrap();
-    let read = Variant::read_within(&PipelineLimits::DEFAULT, &file).unwrap();
-    assert_eq!((read.name.as_str(), &read.toml), ("mine", &preset.toml));
-    std::fs::write(&file, "type = \"icq\"").unwrap();
-    assert!(Variant::read_within(&PipelineLimits::DEFAULT, &file).is_err());
-    assert!(
-        Variant::read_within(&PipelineLimits::DEFAULT, &folder.path().join("absent.toml")).is_err()
-    );
+    folder.write("mine.toml", &preset.toml);
+    let mine = read("mine.toml").unwrap();
+    assert_eq!((mine.name.as_str(), &mine.toml), ("mine", &preset.toml));
+    folder.write("wrong.toml", "type = \"icq\"");
+    assert!(read("wrong.toml").is_err() && read("absent.toml").is_err());
 }
 
 #[test]

@@ -163,28 +163,18 @@ fn fields_of_a_sequential_configuration_are_checked() {
 
 #[test]
 fn invalid_configurations_are_not_run() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
+    let folder = Folder::new();
+    let out = folder.path("out");
     let presets = [Variant::preset(Preset::Hybrid)];
     let mut config = Config::new(Experiment::InitNoise, &subjects(), &presets, 2, 3).unwrap();
     config.bins = 0;
     let go = &mut |_| ControlFlow::Continue(());
-    let outcome = run(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
-    assert!(
-        outcome
-            .to_string()
-            .ends_with("bins: found 0, expected 1 to 1000"),
-        "{outcome}"
-    );
+    let outcome = run(&config, &subjects(), &out, RunOptions::default(), go);
+    refused(outcome, &["bins: found 0, expected 1 to 1000"]);
     let mut config = TrajectoryConfig::new(&subjects(), &[Preset::Hybrid], 1, 3).unwrap();
     config.bins = 0;
-    let outcome = run(&config, &subjects(), &out, RunOptions::default(), go).unwrap_err();
-    assert!(
-        outcome
-            .to_string()
-            .ends_with("bins: found 0, expected 1 to 1000"),
-        "{outcome}"
-    );
+    let outcome = run(&config, &subjects(), &out, RunOptions::default(), go);
+    refused(outcome, &["bins: found 0, expected 1 to 1000"]);
     assert!(!out.exists());
 }
 
@@ -197,30 +187,22 @@ fn the_committed_configurations_are_read() {
         return;
     }
     for name in ["beyond", "sequential", "sequential/improved"] {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::copy(
-            docs.join(name).join(CONFIG_FILE),
-            folder.path().join(CONFIG_FILE),
-        )
-        .unwrap();
-        let put =
-            |rows: &str, text: String| std::fs::write(folder.path().join(rows), text).unwrap();
+        let folder = Folder::new();
+        let config = std::fs::read(docs.join(name).join(CONFIG_FILE)).unwrap();
+        folder.write(CONFIG_FILE, config);
         if name == "beyond" {
-            put(
-                Config::ROWS_FILE,
-                header::<Config>() + "\nbowl,0,hybrid,perfect,0,0.05,0.04,1.5,9,converged,2.5,,\n",
-            );
-            let outcome = Study::read(folder.path());
-            assert!(
-                outcome.is_ok_and(|study| study.config.levels.len() == 14),
-                "{name}"
-            );
+            let row = "\nbowl,0,hybrid,perfect,0,0.05,0.04,1.5,9,converged,2.5,,\n";
+            folder.write(Config::ROWS_FILE, header::<Config>() + row);
+            let study = folder.study::<Config>();
+            assert_eq!(study.config.levels.len(), 14, "{name}");
         } else {
             let row = "\nbowl,0,0,hybrid,last-estimate,0.05,0.04,1.5,9,2.5,\n";
-            let rows = header::<TrajectoryConfig>() + row;
-            put(TrajectoryConfig::ROWS_FILE, rows);
-            let outcome = TrajectoryStudy::read(folder.path());
-            assert!(outcome.is_ok_and(|study| study.config.bins == 10), "{name}");
+            folder.write(
+                TrajectoryConfig::ROWS_FILE,
+                header::<TrajectoryConfig>() + row,
+            );
+            let study = folder.study::<TrajectoryConfig>();
+            assert_eq!(study.config.bins, 10, "{name}");
         }
     }
 }
@@ -234,7 +216,7 @@ fn ranges_of_bins_have_fixed_limits_of_the_initial_vsd() {
         (1, 0..0, 1..1, "0.0-1.0"),
     ] {
         let stored = Stored::single();
-        let mut study = Study::read(stored.folder.path()).unwrap();
+        let mut study = Study::read(stored.root()).unwrap();
         study.config.bins = bins;
         let analysis = Analysis::of(&study);
         let range = |label| {

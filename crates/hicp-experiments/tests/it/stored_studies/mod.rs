@@ -7,19 +7,20 @@ mod rows;
 
 use hicp_experiments::{
     Analysis, CONFIG_FILE, Config, Design, Experiment, ExperimentError, FusionRule, HIGH, LOW,
-    MAX_BINS, MAX_CELLS, MAX_OBJECTS, Metric, Report, RunOptions, Study, Subject, TrajectoryConfig,
-    TrajectoryReport, TrajectoryStudy, Variant, run,
+    MAX_BINS, MAX_CELLS, MAX_OBJECTS, Metric, Report, ReportOf, Reported, RunOptions, Study,
+    StudyOf, TrajectoryConfig, TrajectoryStudy, Variant, run,
 };
 use hicp_io::{IoError, IoErrorKind, Place, ReadLimits};
-use hicp_sim::Household;
 use hybrid_icp::Preset;
 use serde_json::{Value, json};
-use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::ops::{ControlFlow, Deref};
+use std::path::Path;
+
+use crate::common::{Folder, assert_contains, refused, subjects};
 
 /// A folder with the two files of a study.
 struct Stored {
-    folder: tempfile::TempDir,
+    folder: Folder,
     rows: &'static str,
 }
 
@@ -39,16 +40,7 @@ impl Stored {
                 }
             }
         }
-        let stored = Self {
-            folder: tempfile::tempdir().unwrap(),
-            rows: Config::ROWS_FILE,
-        };
-        stored.write(
-            CONFIG_FILE,
-            serde_json::to_string_pretty(&config).unwrap() + "\n",
-        );
-        stored.write(Config::ROWS_FILE, text);
-        stored
+        Self::of(&config, &text)
     }
 
     /// Creates a sequential study of two objects and one trajectory per bin.
@@ -68,45 +60,33 @@ impl Stored {
                 }
             }
         }
-        let stored = Self {
-            folder: tempfile::tempdir().unwrap(),
-            rows: TrajectoryConfig::ROWS_FILE,
-        };
-        stored.write(
-            CONFIG_FILE,
-            serde_json::to_string_pretty(&config).unwrap() + "\n",
-        );
-        stored.write(TrajectoryConfig::ROWS_FILE, text);
-        stored
+        Self::of(&config, &text)
     }
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
-        std::fs::write(self.path(name), bytes).unwrap();
-    }
-
-    fn text(&self, name: &str) -> String {
-        std::fs::read_to_string(self.path(name)).unwrap()
+    fn of<D: Design>(config: &D, rows: &str) -> Self {
+        let folder = Folder::new();
+        let config = serde_json::to_string_pretty(config).unwrap() + "\n";
+        folder.write(CONFIG_FILE, config);
+        folder.write(D::ROWS_FILE, rows);
+        Self {
+            folder,
+            rows: D::ROWS_FILE,
+        }
     }
 
     /// Reads the study and analyzes it like a report.
     fn read(&self) -> Result<usize, ExperimentError> {
-        let folder = self.folder.path();
         if self.rows == Config::ROWS_FILE {
-            let study = Study::read(folder)?;
-            let rows = study.rows.len();
-            assert_eq!(
-                Report::of(vec![("it".to_owned(), study)]).entries().len(),
-                1
-            );
-            return Ok(rows);
+            Self::analyzed::<Config>(self.root())
+        } else {
+            Self::analyzed::<TrajectoryConfig>(self.root())
         }
-        let study = TrajectoryStudy::read(folder)?;
+    }
+
+    fn analyzed<D: Reported>(folder: &Path) -> Result<usize, ExperimentError> {
+        let study = StudyOf::<D>::read(folder)?;
         let rows = study.rows.len();
-        let report = TrajectoryReport::of(vec![("it".to_owned(), study)]);
+        let report = ReportOf::of(vec![("it".to_owned(), study)]);
         assert!(report.entries()[0].analysis.variants().len() > 1);
         Ok(rows)
     }
@@ -130,11 +110,11 @@ impl Stored {
         (field, error.found, error.expected)
     }
 
-    /// Changes the rows, reads the study, and restores the file.
+    /// Changes the rows, asserts the line and a part of the error, and restores the file.
     ///
-    /// Returns line and message of the error.
+    /// Returns the message.
     #[track_caller]
-    fn with_rows(&self, change: impl FnOnce(&str) -> String) -> (usize, String) {
+    fn refuses_rows(&self, change: impl FnOnce(&str) -> String, line: usize, part: &str) -> String {
         let before = self.text(self.rows);
         let after = change(&before);
         assert_ne!(before, after);
@@ -143,21 +123,34 @@ impl Stored {
         self.write(self.rows, before);
         let error = content_error(outcome);
         assert_eq!(error.path, self.path(self.rows));
-        let Some(Place::Line(line)) = error.place else {
-            panic!("{error:?}");
-        };
-        (
-            line,
-            format!("{}, expected {}", error.found, error.expected),
-        )
+        assert_eq!(error.place, Some(Place::Line(line)), "{error}");
+        let what = format!("{}, expected {}", error.found, error.expected);
+        assert_contains(&what, &[part]);
+        what
+    }
+}
+
+impl Deref for Stored {
+    type Target = Folder;
+
+    fn deref(&self) -> &Folder {
+        &self.folder
     }
 }
 
 /// Returns the error, which must be about the content of a file.
 #[track_caller]
 fn content_error<T: std::fmt::Debug>(result: Result<T, ExperimentError>) -> IoError {
+    error_of_kind(result, IoErrorKind::Content)
+}
+
+#[track_caller]
+fn error_of_kind<T: std::fmt::Debug>(
+    result: Result<T, ExperimentError>,
+    kind: IoErrorKind,
+) -> IoError {
     match result {
-        Err(ExperimentError::Io(error)) if error.kind == IoErrorKind::Content => error,
+        Err(ExperimentError::Io(error)) if error.kind == kind => error,
         result => panic!("{result:?}"),
     }
 }
@@ -170,10 +163,6 @@ fn header<D: Design>() -> String {
         .join(",")
 }
 
-fn subjects() -> Vec<Subject> {
-    Subject::household(&[Household::Mug, Household::Book]).unwrap()
-}
-
 #[test]
 fn unchanged_studies_are_read() {
     assert_eq!(Stored::single().read().unwrap(), 8);
@@ -182,7 +171,7 @@ fn unchanged_studies_are_read() {
 
 /// Resumes a study, and stops it before the first case, so that nothing is computed.
 fn resume(stored: &Stored) -> Result<(), ExperimentError> {
-    let folder = stored.folder.path();
+    let folder = stored.root();
     let config = stored.text(CONFIG_FILE);
     let options = RunOptions {
         resume: true,
@@ -215,10 +204,8 @@ fn a_study_resumes_only_from_its_own_first_rows() {
         // The file ends within the last row, also if it is padded with zeros.
         stored.write(stored.rows, &whole[..whole.len() - 3]);
         stopped(cases - 1);
-        stored.write(
-            stored.rows,
-            [&whole.as_bytes()[..whole.len() - 3], &[0; 100]].concat(),
-        );
+        let padded = [&whole.as_bytes()[..whole.len() - 3], &[0; 100]].concat();
+        stored.write(stored.rows, padded);
         stopped(cases - 1);
         stored.write(stored.rows, &whole);
 
@@ -239,7 +226,7 @@ fn a_study_resumes_only_from_its_own_first_rows() {
             stored.write(stored.rows, &rows);
             let error = content_error(resume(&stored));
             assert_eq!(error.path, stored.path(stored.rows));
-            assert!(error.to_string().contains(part), "{error}");
+            assert_contains(&error.to_string(), &[part]);
             // The file is not overwritten.
             assert_eq!(stored.text(stored.rows), rows);
         }
@@ -248,26 +235,20 @@ fn a_study_resumes_only_from_its_own_first_rows() {
         let place = whole.rfind("0.04").unwrap();
         foreign[place] = 0xff;
         stored.write(stored.rows, &foreign);
-        let outcome = resume(&stored).unwrap_err().to_string();
-        let (line, field) = (whole.lines().count(), "vsd_final \"\u{fffd}.04\"");
-        assert!(
-            outcome.contains(&format!("line {line}")) && outcome.contains(field),
-            "{outcome}"
-        );
-        assert_eq!(std::fs::read(stored.path(stored.rows)).unwrap(), foreign);
+        let line = format!("line {}", whole.lines().count());
+        refused(resume(&stored), &[&line, "vsd_final \"\u{fffd}.04\""]);
+        assert_eq!(stored.bytes(stored.rows), foreign);
         let utf16: Vec<u8> = whole.encode_utf16().flat_map(u16::to_be_bytes).collect();
         stored.write(stored.rows, &utf16);
-        assert!(matches!(
-            resume(&stored),
-            Err(ExperimentError::Io(IoError { kind: IoErrorKind::Encoding, found, .. })) if found.contains("UTF-16 BE")
-        ));
+        let error = error_of_kind(resume(&stored), IoErrorKind::Encoding);
+        assert_contains(&error.found, &["UTF-16 BE"]);
     }
 }
 
 #[test]
 fn handmade_studies_do_not_panic() {
     let stored = Stored::single();
-    let study = Study::read(stored.folder.path()).unwrap();
+    let study = Study::read(stored.root()).unwrap();
     type Change = fn(&mut Study);
     let changes: [Change; 6] = [
         |study| study.rows.clear(),

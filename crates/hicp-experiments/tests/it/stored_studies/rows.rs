@@ -2,11 +2,12 @@
 
 use super::*;
 
+type Tighten = fn(&mut ReadLimits);
+
 #[test]
 fn rows_that_contradict_the_configuration_are_refused() {
     let stored = Stored::single();
     let first = "mug,0,hybrid,0,0,0.05,0.04";
-    let instead = |row: &str| stored.with_rows(|rows| rows.replacen(first, row, 1));
     for (row, part) in [
         (
             "pan,0,hybrid,0,0,0.05,0.04",
@@ -32,38 +33,38 @@ fn rows_that_contradict_the_configuration_are_refused() {
         ("mug,0,hybrid,0,0,0.05,NaN", "vsd_final \"NaN\""),
         ("mug,0,hybrid,0,0,0.05,0.04,1", "14 fields, expected 13"),
     ] {
-        let (line, what) = instead(row);
-        assert!(line == 2 && what.contains(part), "{line}: {what}");
+        stored.refuses_rows(|rows| rows.replacen(first, row, 1), 2, part);
     }
-    let (line, what) = stored.with_rows(|rows| rows.replacen("book,1,hybrid", "pan,1,hybrid", 1));
-    assert!(
-        line == 8 && what.contains("object \"pan\", expected \"book\""),
-        "{line}: {what}"
+    stored.refuses_rows(
+        |rows| rows.replacen("book,1,hybrid", "pan,1,hybrid", 1),
+        8,
+        "object \"pan\", expected \"book\"",
     );
     // A run writes every row once, on one line, and no row after the last one.
-    let (line, what) =
-        stored.with_rows(|rows| rows.replacen("2.5,,\n", "2.5,,\"two\nlines\"\n", 1));
-    assert!(line == 4 && what.contains("each on one line"), "{what}");
-    let (line, what) = stored.with_rows(|rows| format!("{rows}{}", rows.lines().last().unwrap()));
-    assert!(
-        line == 10 && what.contains("another row, expected at most 8"),
-        "{what}"
+    stored.refuses_rows(
+        |rows| rows.replacen("2.5,,\n", "2.5,,\"two\nlines\"\n", 1),
+        4,
+        "each on one line",
     );
-    let (line, what) = stored.with_rows(|rows| {
+    stored.refuses_rows(
+        |rows| format!("{rows}{}", rows.lines().last().unwrap()),
+        10,
+        "another row, expected at most 8",
+    );
+    let twice = |rows: &str| {
         let first = rows.split_inclusive('\n').nth(1).unwrap();
         rows.replacen(first, &first.repeat(2), 1)
-    });
-    assert!(
-        line == 3 && what.contains("variant \"hybrid\", expected \"nn-point-to-point\""),
-        "{what}"
-    );
-    let (line, what) = stored.with_rows(|rows| rows.replacen("variant", "pipeline", 1));
-    assert!(
-        line == 1 && what.contains("\"object,case,pipeline"),
-        "{what}"
+    };
+    let part = "variant \"hybrid\", expected \"nn-point-to-point\"";
+    stored.refuses_rows(twice, 3, part);
+    stored.refuses_rows(
+        |rows| rows.replacen("variant", "pipeline", 1),
+        1,
+        "\"object,case,pipeline",
     );
     // A message does not contain a whole value of a megabyte.
-    let (_, what) = instead(&format!("{},0,hybrid,0,0,0.05,0.04", "x".repeat(1 << 20)));
+    let long = format!("{},0,hybrid,0,0,0.05,0.04", "x".repeat(1 << 20));
+    let what = stored.refuses_rows(|rows| rows.replacen(first, &long, 1), 2, "");
     assert!(what.len() < 250, "{} bytes", what.len());
 }
 
@@ -92,8 +93,7 @@ fn rows_that_contradict_a_sequential_configuration_are_refused() {
         ),
         ("mug,0,0,hybrid,last-estimate,0.05,2", "vsd_final \"2\""),
     ] {
-        let (line, what) = stored.with_rows(|rows| rows.replacen(first, row, 1));
-        assert!(line == 2 && what.contains(part), "{line}: {what}");
+        stored.refuses_rows(|rows| rows.replacen(first, row, 1), 2, part);
     }
 }
 
@@ -111,40 +111,21 @@ fn a_study_without_rows_is_refused() {
 #[test]
 fn encodings_and_limits_are_reported() {
     for stored in [Stored::single(), Stored::sequential()] {
-        let folder = stored.folder.path();
+        let folder = stored.root();
         let within = |limits: &ReadLimits| match stored.rows {
             Config::ROWS_FILE => Study::read_within(limits, folder).map(|_| ()),
             _ => TrajectoryStudy::read_within(limits, folder).map(|_| ()),
         };
-        for (limits, field) in [
-            (
-                ReadLimits {
-                    max_small_json_bytes: 50,
-                    ..ReadLimits::DEFAULT
-                },
-                "max_small_json_bytes",
-            ),
-            (
-                ReadLimits {
-                    max_file_bytes: 50,
-                    ..ReadLimits::DEFAULT
-                },
-                "max_file_bytes",
-            ),
-            (
-                ReadLimits {
-                    max_rows: 7,
-                    ..ReadLimits::DEFAULT
-                },
-                "max_rows",
-            ),
-        ] {
-            match within(&limits) {
-                Err(ExperimentError::Io(error)) if error.kind == IoErrorKind::Limit => {
-                    assert!(error.expected.contains(field), "{error}");
-                }
-                outcome => panic!("{field}: {outcome:?}"),
-            }
+        let limits: [(&str, Tighten); 3] = [
+            ("max_small_json_bytes", |l| l.max_small_json_bytes = 50),
+            ("max_file_bytes", |l| l.max_file_bytes = 50),
+            ("max_rows", |l| l.max_rows = 7),
+        ];
+        for (field, tighten) in limits {
+            let mut limits = ReadLimits::DEFAULT;
+            tighten(&mut limits);
+            let error = error_of_kind(within(&limits), IoErrorKind::Limit);
+            assert_contains(&error.expected, &[field]);
         }
         for name in [CONFIG_FILE, stored.rows] {
             let before = stored.text(name);
@@ -153,18 +134,9 @@ fn encodings_and_limits_are_reported() {
             let utf16: Vec<u8> = before.encode_utf16().flat_map(u16::to_le_bytes).collect();
             for bytes in [[&[0xff, 0xfe], &utf16[..]].concat(), utf16] {
                 stored.write(name, bytes);
-                match stored.read() {
-                    Err(ExperimentError::Io(IoError {
-                        kind: IoErrorKind::Encoding,
-                        path,
-                        found,
-                        ..
-                    })) => {
-                        assert_eq!(path, stored.path(name));
-                        assert!(found.contains("UTF-16 LE"), "{found}");
-                    }
-                    outcome => panic!("{name}: {outcome:?}"),
-                }
+                let error = error_of_kind(stored.read(), IoErrorKind::Encoding);
+                assert_eq!(error.path, stored.path(name));
+                assert_contains(&error.found, &["UTF-16 LE"]);
             }
             stored.write(name, [before.as_bytes(), b"\xff"].concat());
             assert!(
