@@ -3,9 +3,9 @@
 use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Iteration};
 
-use crate::filter::distances::{collect_finite, share_of};
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
+use crate::filter::quantile::distances::{collect_finite, share_of};
 
 /// Keeps the closest share f of the pairs, with the f that minimizes the fractional RMSD.
 ///

@@ -3,9 +3,9 @@
 use hicp_core::internal::Scratch;
 use hicp_core::{Correspondences, Iteration};
 
-use crate::filter::distances::{collect_finite, nth_smallest, share_of};
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
+use crate::filter::quantile::distances::{collect_finite, nth_smallest, share_of};
 
 /// Keeps the closest share of the pairs (trimmed ICP, Chetverikov, Stepanov & Krsek 2005).
 ///

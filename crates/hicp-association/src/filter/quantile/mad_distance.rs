@@ -3,9 +3,9 @@
 use hicp_core::internal::{Scratch, median};
 use hicp_core::{Correspondences, Iteration};
 
-use crate::filter::distances::collect_finite;
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
+use crate::filter::quantile::distances::collect_finite;
 
 /// σ of a normal distribution, divided by its median absolute deviation.
 const SIGMA_PER_MAD: f32 = 1.4826;

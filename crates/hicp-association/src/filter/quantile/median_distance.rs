@@ -3,9 +3,9 @@
 use hicp_core::internal::{Scratch, median};
 use hicp_core::{Correspondences, Iteration};
 
-use crate::filter::distances::collect_finite;
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
+use crate::filter::quantile::distances::collect_finite;
 
 /// Removes pairs further apart than `factor` times the median distance.
 ///
