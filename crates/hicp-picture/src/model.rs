@@ -36,16 +36,14 @@ impl Picture {
             &mut view,
         );
         let light = Vector3::new(-0.4, -0.7, -0.6).normalize();
-        for v in 0..side {
-            for u in 0..side {
-                let Some(surfel) = view.surfel_at(u, v, model.mesh(), &camera, &camera_from_object)
-                else {
-                    continue;
-                };
-                let lit = surfel.normal.cast::<f64>().dot(&light).max(0.0);
-                let color = SURFACE.map(|full| (full * (0.3 + 0.7 * lit)) as u8);
-                picture.mix((u.into(), v.into()), color, 1.0);
-            }
+        for (u, v) in camera.region().pixels() {
+            let Some(surfel) = view.surfel_at(u, v, model.mesh(), &camera, &camera_from_object)
+            else {
+                continue;
+            };
+            let lit = surfel.normal.cast::<f64>().dot(&light).max(0.0);
+            let color = SURFACE.map(|full| (full * (0.3 + 0.7 * lit)) as u8);
+            picture.mix((u.into(), v.into()), color, 1.0);
         }
         Ok(picture)
     }

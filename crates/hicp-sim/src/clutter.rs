@@ -376,26 +376,23 @@ mod tests {
             assert_eq!(view.depth, look().unwrap().depth);
             let table = camera.width() * camera.height() / 10;
             let mut of_table = 0;
-            for v in 0..camera.height() {
-                for u in 0..camera.width() {
-                    let z = f64::from(view.depth.pixels()[(v * camera.width() + u) as usize]);
-                    let owners = view.instances.iter();
-                    let owners = owners.filter(|i| i.visible.get(u, v) == Some(true)).count();
-                    assert!(owners <= 1);
-                    let point = camera.unproject(f64::from(u), f64::from(v), z);
-                    let world = view.camera_from_world.inverse() * point;
-                    if owners == 0 && z > 0.0 {
-                        assert!(world.z.abs() < 1e-4, "{world}");
-                        of_table += 1;
-                    } else if owners == 1 {
-                        assert!(world.z > -1e-4, "{world}");
-                    }
+            for (u, v) in camera.region().pixels() {
+                let z = f64::from(view.depth.pixels()[(v * camera.width() + u) as usize]);
+                let owners = view.instances.iter();
+                let owners = owners.filter(|i| i.visible.get(u, v) == Some(true)).count();
+                assert!(owners <= 1);
+                let point = camera.unproject(f64::from(u), f64::from(v), z);
+                let world = view.camera_from_world.inverse() * point;
+                if owners == 0 && z > 0.0 {
+                    assert!(world.z.abs() < 1e-4, "{world}");
+                    of_table += 1;
+                } else if owners == 1 {
+                    assert!(world.z > -1e-4, "{world}");
                 }
             }
             assert!(of_table > table);
             for instance in &view.instances {
-                let count = |mask: &Mask| mask.n_set();
-                let (all, seen) = (count(&instance.silhouette), count(&instance.visible));
+                let (all, seen) = (instance.silhouette.n_set(), instance.visible.n_set());
                 assert!(all > 50 && seen <= all, "{seen} of {all}");
                 hidden += usize::from(seen < all);
             }

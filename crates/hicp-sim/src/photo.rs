@@ -74,34 +74,31 @@ impl Lighting {
         let across = unit_vector(rng);
         let noise = Normal::new(0.0, self.noise.max(0.0));
         let mut pixels = Vec::with_capacity(region.area());
-        for v in 0..camera.height() {
-            for u in 0..camera.width() {
-                let seen = visible.get(u, v) == Some(true);
-                let surfel = view.surfel_at(u, v, mesh, camera, camera_from_object);
-                let color = view.color_at(u, v, mesh, camera, camera_from_object);
-                let mut value = patches[(v / 16 % 64 * 64 + u / 16 % 64) as usize];
-                if let (true, Some(surfel), Some(color)) = (seen, surfel, color) {
-                    let normal = surfel.normal.cast::<f64>().into_inner();
-                    let toward_lamp = normal.dot(&self.direction);
-                    let mirrored = normal * (2.0 * toward_lamp) - self.direction;
-                    let to_camera = -surfel.point.cast::<f64>().coords.normalize();
-                    let gloss = mirrored.dot(&to_camera).max(0.0).powi(30);
-                    let side = (surfel.point.cast::<f64>() - center).dot(&across);
-                    let lit = if side > 0.0 { self.shadow } else { 1.0 };
-                    let light = lit * (self.ambient + (1.0 - self.ambient) * toward_lamp.max(0.0));
-                    value =
-                        color.map(|c| f64::from(c) * light + lit * 255.0 * self.highlight * gloss);
-                }
-                let mut pixel = [0; 3];
-                for (channel, pixel) in pixel.iter_mut().enumerate() {
-                    let gain = self.exposure * self.white_balance[channel];
-                    let random = noise.as_ref().map_or(0.0, |noise| noise.sample(rng));
-                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Saturates.
-                    let value = (value[channel] * gain + random).round() as u8;
-                    *pixel = value;
-                }
-                pixels.push(pixel);
+        for (u, v) in region.pixels() {
+            let seen = visible.get(u, v) == Some(true);
+            let surfel = view.surfel_at(u, v, mesh, camera, camera_from_object);
+            let color = view.color_at(u, v, mesh, camera, camera_from_object);
+            let mut value = patches[(v / 16 % 64 * 64 + u / 16 % 64) as usize];
+            if let (true, Some(surfel), Some(color)) = (seen, surfel, color) {
+                let normal = surfel.normal.cast::<f64>().into_inner();
+                let toward_lamp = normal.dot(&self.direction);
+                let mirrored = normal * (2.0 * toward_lamp) - self.direction;
+                let to_camera = -surfel.point.cast::<f64>().coords.normalize();
+                let gloss = mirrored.dot(&to_camera).max(0.0).powi(30);
+                let side = (surfel.point.cast::<f64>() - center).dot(&across);
+                let lit = if side > 0.0 { self.shadow } else { 1.0 };
+                let light = lit * (self.ambient + (1.0 - self.ambient) * toward_lamp.max(0.0));
+                value = color.map(|c| f64::from(c) * light + lit * 255.0 * self.highlight * gloss);
             }
+            let mut pixel = [0; 3];
+            for (channel, pixel) in pixel.iter_mut().enumerate() {
+                let gain = self.exposure * self.white_balance[channel];
+                let random = noise.as_ref().map_or(0.0, |noise| noise.sample(rng));
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Saturates.
+                let value = (value[channel] * gain + random).round() as u8;
+                *pixel = value;
+            }
+            pixels.push(pixel);
         }
         Ok(ColorImage::new(camera.width(), camera.height(), pixels)?)
     }

@@ -324,13 +324,11 @@ fn observe(depth: Vec<f32>, camera: PinholeCamera) -> Observation {
 
 /// The depth of a plane n·X = d in the test camera.
 fn plane_depth(normal: &UnitVector3<f64>, offset: f64, camera: &PinholeCamera) -> Vec<f32> {
-    (0..camera.height())
-        .flat_map(|v| (0..camera.width()).map(move |u| (u, v)))
-        .map(|(u, v)| {
-            let ray = camera.unproject(f64::from(u), f64::from(v), 1.0);
-            (offset / normal.dot(&ray.coords)) as f32
-        })
-        .collect()
+    let depth = camera.region().pixels().map(|(u, v)| {
+        let ray = camera.unproject(f64::from(u), f64::from(v), 1.0);
+        (offset / normal.dot(&ray.coords)) as f32
+    });
+    depth.collect()
 }
 
 fn scene_with(observation: Observation) -> Scene {

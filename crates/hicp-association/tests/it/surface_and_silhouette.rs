@@ -116,8 +116,7 @@ fn boxed(mask: &Mask, pixels: u32) -> Mask {
 }
 
 fn by_pixel(on: impl Fn(u32, u32) -> bool) -> Mask {
-    let pixels = (0..120).flat_map(|v| (0..160).map(move |u| (u, v)));
-    Mask::new(160, 120, pixels.map(|(u, v)| on(u, v)).collect()).unwrap()
+    Mask::in_region(160, 120, &camera().region(), on)
 }
 
 /// Returns the signed distance from a source to its target along the normal, pixels.

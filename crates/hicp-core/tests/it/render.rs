@@ -71,15 +71,11 @@ fn a_view_is_empty_before_it_is_filled_and_after_a_reset() {
             }
         }
         assert_eq!(view.n_rendered(), area.area().div_ceil(3));
-        let mut index = 0;
-        for v in area.v_min..area.v_max {
-            for u in area.u_min..area.u_max {
-                let shown = index % 3 == 0;
-                let z = if shown { 0.5 + index as f32 } else { 0.0 };
-                assert_eq!(view.depth_at(u, v), z);
-                assert_eq!(view.triangles()[index] != NO_TRIANGLE, shown);
-                index += 1;
-            }
+        for (index, (u, v)) in area.pixels().enumerate() {
+            let shown = index % 3 == 0;
+            let z = if shown { 0.5 + index as f32 } else { 0.0 };
+            assert_eq!(view.depth_at(u, v), z);
+            assert_eq!(view.triangles()[index] != NO_TRIANGLE, shown);
         }
         let outside = [
             (area.u_max, area.v_min),
@@ -129,7 +125,7 @@ fn a_surfel_lies_on_its_pixels_ray_with_the_triangles_normal_facing_the_camera()
             // A view of a part agrees with the view of the whole.
             let part = region(15, 9, 33, 30);
             let view = fresh(mesh, &camera, &pose, &part);
-            for (u, v) in (0..36).flat_map(|v| (0..48).map(move |u| (u, v))) {
+            for (u, v) in camera.region().pixels() {
                 let surfel = whole.surfel_at(u, v, mesh, &camera, &pose);
                 assert_eq!(whole.surfel_at(u, v, &one, &camera, &pose).is_some(), {
                     let index = camera.region().index(u, v).unwrap();

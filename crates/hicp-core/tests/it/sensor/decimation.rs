@@ -12,12 +12,10 @@ fn fine() -> Observation {
     let camera = PinholeCamera::new(80.0, 84.0, 25.3, 21.9, width, height).unwrap();
     let mut numbers = Numbers(51);
     let (mut depth, mut mask) = (Vec::new(), Vec::new());
-    for v in 0..height {
-        for u in 0..width {
-            let z = 0.5 + 0.001 * f64::from(u) + 0.003 * f64::from(v);
-            depth.push(if numbers.unit() < 0.1 { 0.0 } else { z as f32 });
-            mask.push((4..50).contains(&u) && (7..45).contains(&v) && numbers.unit() < 0.9);
-        }
+    for (u, v) in camera.region().pixels() {
+        let z = 0.5 + 0.001 * f64::from(u) + 0.003 * f64::from(v);
+        depth.push(if numbers.unit() < 0.1 { 0.0 } else { z as f32 });
+        mask.push((4..50).contains(&u) && (7..45).contains(&v) && numbers.unit() < 0.9);
     }
     let depth = DepthImage::from_meters(width, height, depth).unwrap();
     let mask = Mask::new(width, height, mask).unwrap();
@@ -40,15 +38,13 @@ fn a_coarse_observation_is_every_nth_pixel_of_the_fine_one() {
             (width, height)
         );
         let (mut n_measured, mut surfels) = (0, Vec::new());
-        for v in 0..height {
-            for u in 0..width {
-                let (x, y) = (u * factor, v * factor);
-                let (z, masked) = (coarse.depth().get(u, v), coarse.mask().get(u, v));
-                assert_eq!((z, masked), (fine.depth().get(x, y), fine.mask().get(x, y)));
-                assert_eq!(coarse.surfel_at(u, v), fine.surfel_at(x, y));
-                n_measured += usize::from(masked == Some(true) && z > Some(0.0));
-                surfels.extend(coarse.surfel_at(u, v).map(|surfel| (u, v, surfel)));
-            }
+        for (u, v) in coarse.camera().region().pixels() {
+            let (x, y) = (u * factor, v * factor);
+            let (z, masked) = (coarse.depth().get(u, v), coarse.mask().get(u, v));
+            assert_eq!((z, masked), (fine.depth().get(x, y), fine.mask().get(x, y)));
+            assert_eq!(coarse.surfel_at(u, v), fine.surfel_at(x, y));
+            n_measured += usize::from(masked == Some(true) && z > Some(0.0));
+            surfels.extend(coarse.surfel_at(u, v).map(|surfel| (u, v, surfel)));
         }
         assert_eq!(coarse.n_measured(), n_measured, "{factor}");
         assert_eq!(coarse.n_surfels(), surfels.len(), "{factor}");

@@ -28,8 +28,8 @@ impl<'a> Definition<'a> {
     fn new(observation: &'a Observation) -> Self {
         let region = observation.region();
         let masked = |(u, v)| observation.mask().get(u, v) == Some(true);
-        let depth = (region.v_min..region.v_max)
-            .flat_map(|v| (region.u_min..region.u_max).map(move |u| (u, v)))
+        let depth = region
+            .pixels()
             .map(|(u, v)| {
                 let z = observation.depth().get(u, v).unwrap();
                 if masked((u, v)) { f64::from(z) } else { 0.0 }
@@ -263,24 +263,22 @@ fn scene(recipe: &Recipe, seed: u64) -> Observation {
     let jumps = step.max(5.0 * 2_f64.sqrt() * recipe.noise) * recipe.jump;
     let offsets: Vec<f64> = (0..n_patches).map(|_| jumps * numbers.unit()).collect();
     let (mut depth, mut mask) = (Vec::new(), Vec::new());
-    for v in 0..camera.height() {
-        for u in 0..camera.width() {
-            let (column, row) = (u as usize / recipe.patch, v as usize / recipe.patch);
-            let patch = (column + row * (width as usize / recipe.patch + 1)) % n_patches;
-            let (a, b) = slopes[patch];
-            let (x, y) = (u as usize % recipe.patch, v as usize % recipe.patch);
-            let noisy = !recipe.right_half || u > width / 2 + 5;
-            let noise = if noisy {
-                recipe.noise * numbers.normal()
-            } else {
-                0.0
-            };
-            let z = 0.6 * (offsets[patch] + a * x as f64 + b * y as f64 + noise).exp();
-            let hole = numbers.unit() < recipe.holes;
-            depth.push(if hole { 0.0 } else { z as f32 });
-            let inside = (5..width + 5).contains(&u) && (2..height + 2).contains(&v);
-            mask.push(inside && numbers.unit() >= recipe.unmasked);
-        }
+    for (u, v) in camera.region().pixels() {
+        let (column, row) = (u as usize / recipe.patch, v as usize / recipe.patch);
+        let patch = (column + row * (width as usize / recipe.patch + 1)) % n_patches;
+        let (a, b) = slopes[patch];
+        let (x, y) = (u as usize % recipe.patch, v as usize % recipe.patch);
+        let noisy = !recipe.right_half || u > width / 2 + 5;
+        let noise = if noisy {
+            recipe.noise * numbers.normal()
+        } else {
+            0.0
+        };
+        let z = 0.6 * (offsets[patch] + a * x as f64 + b * y as f64 + noise).exp();
+        let hole = numbers.unit() < recipe.holes;
+        depth.push(if hole { 0.0 } else { z as f32 });
+        let inside = (5..width + 5).contains(&u) && (2..height + 2).contains(&v);
+        mask.push(inside && numbers.unit() >= recipe.unmasked);
     }
     let (width, height) = (camera.width(), camera.height());
     let depth = DepthImage::from_meters(width, height, depth).unwrap();

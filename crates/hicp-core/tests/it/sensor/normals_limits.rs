@@ -8,10 +8,8 @@ use hicp_core::{
 
 fn image(camera: &PinholeCamera, depth: impl Fn(u32, u32) -> f32) -> Observation {
     let (width, height) = (camera.width(), camera.height());
-    let depth = (0..height)
-        .flat_map(|v| (0..width).map(move |u| (u, v)))
-        .map(|(u, v)| depth(u, v))
-        .collect();
+    let pixels = camera.region().pixels();
+    let depth = pixels.map(|(u, v)| depth(u, v)).collect();
     let depth = DepthImage::from_meters(width, height, depth).unwrap();
     Observation::new(depth, Mask::full(width, height), *camera).unwrap()
 }
@@ -111,19 +109,17 @@ fn lines_of_every_slope_determine_no_normal() {
                 .map(|(u, v)| (u, if upwards { height - 1 - v } else { v }))
                 .collect();
             let (mut depth, mut mask) = (Vec::new(), Vec::new());
-            for v in 0..height {
-                for u in 0..width {
-                    let on_line = line.contains(&(u, v));
-                    let wall = 0.6 * (1.0 + 0.03 * numbers.normal());
-                    // The line is as rough as possible, so that its sums are rounded.
-                    let z = if on_line {
-                        numbers.between(0.2, 3.0)
-                    } else {
-                        wall
-                    };
-                    depth.push(z as f32);
-                    mask.push(on_line || u >= 48);
-                }
+            for (u, v) in camera.region().pixels() {
+                let on_line = line.contains(&(u, v));
+                let wall = 0.6 * (1.0 + 0.03 * numbers.normal());
+                // The line is as rough as possible, so that its sums are rounded.
+                let z = if on_line {
+                    numbers.between(0.2, 3.0)
+                } else {
+                    wall
+                };
+                depth.push(z as f32);
+                mask.push(on_line || u >= 48);
             }
             let depth = DepthImage::from_meters(width, height, depth).unwrap();
             let mask = Mask::new(width, height, mask).unwrap();

@@ -19,15 +19,15 @@ fn ragged(width: u32, height: u32, seed: u64) -> Observation {
     let depth = (0..width * height)
         .map(|_| if numbers.unit() < 0.1 { 0.0 } else { 0.5 })
         .collect();
-    let mask = (0..height)
-        .flat_map(|v| (0..width).map(move |u| (u, v)))
-        .map(|(u, v)| {
-            (3..width - 4).contains(&u) && (5..height - 2).contains(&v) && numbers.unit() < 0.9
-        })
-        .collect();
+    let masked = PixelRegion {
+        u_min: 3,
+        v_min: 5,
+        u_max: width - 4,
+        v_max: height - 2,
+    };
     Observation::new(
         DepthImage::from_meters(width, height, depth).unwrap(),
-        Mask::new(width, height, mask).unwrap(),
+        Mask::in_region(width, height, &masked, |_, _| numbers.unit() < 0.9),
         camera(width, height),
     )
     .unwrap()
@@ -170,24 +170,22 @@ fn an_empty_mask_and_an_image_of_zeros_have_no_surfels() {
 fn surfels_exist_only_at_measured_pixels_and_at_their_depth() {
     let observation = ragged(40, 30, 31);
     let (mut measured, mut surfels) = (0, 0);
-    for v in 0..30 {
-        for u in 0..40 {
-            let usable = observation.mask().get(u, v) == Some(true)
-                && observation.depth().get(u, v) > Some(0.0);
-            measured += usize::from(usable);
-            let Some(surfel) = observation.surfel_at(u, v) else {
-                continue;
-            };
-            surfels += 1;
-            assert!(usable, "({u}, {v}) is not masked or has no depth");
-            let expected = observation.camera().unproject(u.into(), v.into(), 0.5);
-            assert!((surfel.point.cast::<f64>() - expected).norm() < 1e-7);
-            assert!((surfel.normal.norm() - 1.0).abs() < 1e-6);
-            assert!(
-                surfel.normal.dot(&surfel.point.coords) < 0.0,
-                "a normal faces the camera"
-            );
-        }
+    for (u, v) in observation.camera().region().pixels() {
+        let usable =
+            observation.mask().get(u, v) == Some(true) && observation.depth().get(u, v) > Some(0.0);
+        measured += usize::from(usable);
+        let Some(surfel) = observation.surfel_at(u, v) else {
+            continue;
+        };
+        surfels += 1;
+        assert!(usable, "({u}, {v}) is not masked or has no depth");
+        let expected = observation.camera().unproject(u.into(), v.into(), 0.5);
+        assert!((surfel.point.cast::<f64>() - expected).norm() < 1e-7);
+        assert!((surfel.normal.norm() - 1.0).abs() < 1e-6);
+        assert!(
+            surfel.normal.dot(&surfel.point.coords) < 0.0,
+            "a normal faces the camera"
+        );
     }
     assert_eq!(
         (observation.n_measured(), observation.n_surfels()),
@@ -204,14 +202,12 @@ fn surfels_of_a_stride_are_the_brute_force_grid_in_row_major_order() {
     for stride in [0, 1, 2, 3, 4, 7, 40, 1000, u32::MAX] {
         let step = stride.max(1);
         let mut expected = Vec::new();
-        for v in 0..33 {
-            for u in 0..41 {
-                if u % step == 0
-                    && v % step == 0
-                    && let Some(surfel) = observation.surfel_at(u, v)
-                {
-                    expected.push((u, v, surfel));
-                }
+        for (u, v) in observation.camera().region().pixels() {
+            if u % step == 0
+                && v % step == 0
+                && let Some(surfel) = observation.surfel_at(u, v)
+            {
+                expected.push((u, v, surfel));
             }
         }
         let found: Vec<_> = observation
@@ -355,8 +351,8 @@ proptest! {
             (Just(w), Just(h), pixels)
         })
     ) {
-        let set: Vec<(u32, u32)> = (0..height)
-            .flat_map(|v| (0..width).map(move |u| (u, v)))
+        let set: Vec<(u32, u32)> = PixelRegion::of_image(width, height)
+            .pixels()
             .filter(|(u, v)| pixels[(v * width + u) as usize])
             .collect();
         let expected = if set.is_empty() {
@@ -378,15 +374,13 @@ proptest! {
     fn an_intersection_contains_the_common_pixels(a in region(), b in region()) {
         let common = a.intersection(&b);
         let mut count = 0;
-        for v in 0..8 {
-            for u in 0..8 {
-                let inside = a.contains(u, v) && b.contains(u, v);
-                prop_assert_eq!(common.contains(u, v), inside);
-                prop_assert_eq!(common.index(u, v).is_some(), inside);
-                if inside {
-                    prop_assert_eq!(common.index(u, v), Some(count));
-                    count += 1;
-                }
+        for (u, v) in PixelRegion::of_image(8, 8).pixels() {
+            let inside = a.contains(u, v) && b.contains(u, v);
+            prop_assert_eq!(common.contains(u, v), inside);
+            prop_assert_eq!(common.index(u, v).is_some(), inside);
+            if inside {
+                prop_assert_eq!(common.index(u, v), Some(count));
+                count += 1;
             }
         }
         prop_assert_eq!(common.area(), count);

@@ -46,18 +46,16 @@ impl Renderer for RayCaster {
         });
         let region = view.region();
         let (depth, triangles) = view.buffers_mut();
-        for v in region.v_min..region.v_max {
-            for u in region.u_min..region.u_max {
-                let ray = camera.unproject(f64::from(u), f64::from(v), 1.0).coords;
-                let index = region.index(u, v).unwrap();
-                for (t, triangle) in (0_u32..).zip(&corners) {
-                    let Some(z) = intersect(&ray, triangle) else {
-                        continue;
-                    };
-                    if depth[index] == 0.0 || (z as f32) < depth[index] {
-                        depth[index] = z as f32;
-                        triangles[index] = t;
-                    }
+        for (u, v) in region.pixels() {
+            let ray = camera.unproject(f64::from(u), f64::from(v), 1.0).coords;
+            let index = region.index(u, v).unwrap();
+            for (t, triangle) in (0_u32..).zip(&corners) {
+                let Some(z) = intersect(&ray, triangle) else {
+                    continue;
+                };
+                if depth[index] == 0.0 || (z as f32) < depth[index] {
+                    depth[index] = z as f32;
+                    triangles[index] = t;
                 }
             }
         }
@@ -200,24 +198,17 @@ pub fn observe(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> 
 pub fn render_depth(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> DepthImage {
     let mut cache = RenderCache::new(RayCaster);
     let view = cache.view(model, camera, pose);
-    let (width, height) = (camera.width(), camera.height());
-    let depth = (0..height)
-        .flat_map(|v| (0..width).map(move |u| (u, v)))
-        .map(|(u, v)| view.depth_at(u, v))
-        .collect();
-    DepthImage::from_meters(width, height, depth).unwrap()
+    let depth = camera.region().pixels();
+    let depth = depth.map(|(u, v)| view.depth_at(u, v));
+    DepthImage::collect(camera.width(), camera.height(), depth).unwrap()
 }
 
 /// Creates a depth image from a function of the ray (x, y, 1).
 pub fn depth_image(camera: &PinholeCamera, mut z: impl FnMut(Vector3<f64>) -> f64) -> DepthImage {
-    let (width, height) = (camera.width(), camera.height());
-    let mut depth = Vec::new();
-    for v in 0..height {
-        for u in 0..width {
-            depth.push(z(camera.unproject(f64::from(u), f64::from(v), 1.0).coords) as f32);
-        }
-    }
-    DepthImage::from_meters(width, height, depth).unwrap()
+    let pixels = camera.region().pixels();
+    let ray = |(u, v)| camera.unproject(f64::from(u), f64::from(v), 1.0).coords;
+    let depth = pixels.map(|pixel| z(ray(pixel)) as f32);
+    DepthImage::collect(camera.width(), camera.height(), depth).unwrap()
 }
 
 /// Returns the depth of the plane n · X = d along a ray (x, y, 1).
