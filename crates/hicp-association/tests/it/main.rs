@@ -14,6 +14,7 @@
 )]
 
 mod associations;
+mod boundary_targets;
 mod common;
 mod filters;
 mod filters_and_weights;
