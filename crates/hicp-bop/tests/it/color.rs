@@ -5,22 +5,14 @@ use hicp_io::bop::{Dataset, ResultRow};
 use hicp_io::{ReadLimits, write_rgb_png};
 use hybrid_icp::{Preset, Refiner};
 
-use crate::refining::{BLOCK, KEY, dataset, estimate};
+use crate::common::{BLOCK, KEY, World, estimate};
 
 /// Copies the models into `models_color` with a color for each vertex.
 fn color_models(dataset: &Dataset) {
     let mesh = dataset.read_model(BLOCK).unwrap();
     let mut text = "ply\nformat ascii 1.0\nelement vertex 8\n".to_owned();
-    for name in [
-        "float x",
-        "float y",
-        "float z",
-        "uchar red",
-        "uchar green",
-        "uchar blue",
-    ] {
-        text += &format!("property {name}\n");
-    }
+    text += "property float x\nproperty float y\nproperty float z\n";
+    text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     text += "element face 12\nproperty list uchar int vertex_indices\nend_header\n";
     for p in mesh.vertices() {
         text += &format!("{} {} {} 9 8 7\n", p.x * 1e3, p.y * 1e3, p.z * 1e3);
@@ -48,9 +40,9 @@ fn refiner(dataset: &Dataset, folder: &ModelFolder) -> DatasetRefiner {
 
 #[test]
 fn the_color_image_is_read_only_if_a_model_has_colors() {
-    let dir = tempfile::tempdir().unwrap();
-    let plain = dataset(dir.path());
-    color_models(&plain);
+    let world = World::new();
+    let plain = &world.dataset;
+    color_models(plain);
     let rows = [ResultRow::new(KEY.0, KEY.1, BLOCK, estimate())];
     let colored = plain.clone().with_models("models_color").unwrap();
     let (models, info) = (
@@ -72,7 +64,7 @@ fn the_color_image_is_read_only_if_a_model_has_colors() {
     };
     // A missing color image is no fault.
     assert!(faults(&colored, &open()).is_empty());
-    let rgb = dir.path().join("test/000001/rgb");
+    let rgb = world.path("test/000001/rgb");
     std::fs::create_dir(&rgb).unwrap();
     write_rgb_png(rgb.join("000004.png"), 160, 120, &[50; 3 * 160 * 120]).unwrap();
     assert!(faults(&colored, &open()).is_empty());
@@ -91,6 +83,6 @@ fn the_color_image_is_read_only_if_a_model_has_colors() {
     assert!(fault.text.contains("80x60"), "{}", fault.text);
     // Without colors of models, nobody reads it.
     assert!(faults(&colored, &open().without_color()).is_empty());
-    assert!(faults(&plain, &plain_folder).is_empty());
-    assert!(plain.with_models("nothing").is_err());
+    assert!(faults(plain, &plain_folder).is_empty());
+    assert!(plain.clone().with_models("nothing").is_err());
 }

@@ -2,18 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use hicp_bop::{EvaluatedObject, Judge, Renders, RowStatus, Scenes, visible_objects};
+use hicp_bop::{EvaluatedObject, Judge, Renders, RowStatus, visible_objects};
 use hicp_io::bop::ResultRow;
 use hybrid_icp::core::{Isometry3, Vector3};
 
-use crate::refining::{BLOCK, KEY, dataset, estimate, models, truth};
+use crate::common::{BLOCK, KEY, World, estimate, truth};
 
 #[test]
 fn errors_are_those_of_the_best_rows() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = dataset(dir.path());
-    let models = models(&dataset, &[BLOCK]);
-    let scenes = Scenes::new(&dataset, "test", 1);
+    let world = World::new();
+    let scenes = world.scenes();
     let row = |object, pose, score| {
         let mut row = ResultRow::new(KEY.0, KEY.1, object, pose);
         row.score = score;
@@ -24,7 +22,7 @@ fn errors_are_those_of_the_best_rows() {
         row(9, truth(), 0.9),
         row(BLOCK, truth(), 0.8),
     ];
-    let objects = EvaluatedObject::of_models(&models, Some(&[BLOCK]));
+    let objects = EvaluatedObject::of_models(&world.models, Some(&[BLOCK]));
     assert!(objects[&BLOCK].symmetric);
     let judge = Judge::new(objects, &scenes, &rows, 0.015);
     assert_eq!(judge.rows_of(KEY, BLOCK), [0, 2]);

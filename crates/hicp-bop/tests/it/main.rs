@@ -4,6 +4,7 @@
 
 mod box_mask;
 mod color;
+mod common;
 mod judging;
 mod models;
 mod refining;

@@ -1,114 +1,17 @@
 //! The refinement of an image's rows, from files to results.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 use std::sync::Arc;
 
 use hicp_bop::{
-    BoxMask, DatasetRefiner, Fault, FaultKind, Image, MaskSource, ModelFolder, Models, Rescore,
-    RowResult, RowStatus, Scenes, detections_by_frame,
+    BoxMask, DatasetRefiner, Fault, FaultKind, MaskSource, ModelFolder, Rescore, RowResult,
+    RowStatus, detections_by_frame,
 };
-use hicp_io::bop::{
-    Dataset, Detection, GroundTruth, ResultRow, Rle, SceneCamera, write_scene_camera,
-    write_scene_gt,
-};
-use hicp_io::{IoError, LengthUnit, ReadLimits, write_depth_png, write_mask_png, write_ply};
-use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, Matrix3, PinholeCamera, Point3, TriMesh, Vector3,
-};
-use hybrid_icp::raster::render_depth_image;
+use hicp_io::bop::{Detection, ResultRow, Rle};
+use hicp_io::{IoError, ReadLimits, write_mask_png};
+use hybrid_icp::core::{Isometry3, Mask};
 use hybrid_icp::{Preset, Refiner};
 
-pub(crate) const KEY: (u32, u32) = (1, 4);
-pub(crate) const BLOCK: u32 = 5;
-
-/// Returns a block of 6 × 8 × 10 cm.
-fn block() -> TriMesh {
-    let corner = |i: u8| {
-        let side = |bit: u8, half: f32| if i & bit == 0 { -half } else { half };
-        Point3::new(side(1, 0.03), side(2, 0.04), side(4, 0.05))
-    };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]);
-    TriMesh::new((0..8).map(corner).collect(), triangles.collect()).unwrap()
-}
-
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(200.0, 200.0, 79.5, 59.5, 160, 120).unwrap()
-}
-
-pub(crate) fn truth() -> Isometry3<f64> {
-    Isometry3::new(Vector3::new(0.02, -0.01, 0.5), Vector3::new(0.5, 0.9, 0.3))
-}
-
-pub(crate) fn estimate() -> Isometry3<f64> {
-    Isometry3::new(Vector3::new(0.004, -0.003, 0.004), Vector3::zeros()) * truth()
-}
-
-/// Returns the depth of the block alone.
-fn depth() -> DepthImage {
-    render_depth_image(&block(), &camera(), &truth())
-}
-
-fn mask() -> Mask {
-    Mask::measured(&depth())
-}
-
-/// Creates a dataset with one image of the block.
-pub(crate) fn dataset(dir: &Path) -> Dataset {
-    let scene = dir.join("test/000001");
-    for folder in ["depth", "mask_visib"] {
-        std::fs::create_dir_all(scene.join(folder)).unwrap();
-    }
-    std::fs::create_dir(dir.join("models")).unwrap();
-    write_ply(
-        dir.join("models/obj_000005.ply"),
-        &block(),
-        LengthUnit::Millimeters,
-    )
-    .unwrap();
-    write_depth_png(scene.join("depth/000004.png"), &depth(), 0.1).unwrap();
-    write_mask_png(scene.join("mask_visib/000004_000000.png"), &mask()).unwrap();
-    let seen_by = SceneCamera {
-        matrix: Matrix3::new(200.0, 0.0, 79.5, 0.0, 200.0, 59.5, 0.0, 0.0, 1.0),
-        image_size: None,
-        depth_scale: Some(0.1),
-        camera_from_world: None,
-    };
-    let there = GroundTruth {
-        obj_id: BLOCK,
-        camera_from_object: truth(),
-    };
-    write_scene_camera(
-        scene.join("scene_camera.json"),
-        &BTreeMap::from([(4, seen_by)]),
-    )
-    .unwrap();
-    write_scene_gt(
-        scene.join("scene_gt.json"),
-        &BTreeMap::from([(4, vec![there])]),
-    )
-    .unwrap();
-    Dataset::open(dir).unwrap()
-}
-
-fn image(dataset: &Dataset) -> Image {
-    Scenes::new(dataset, "test", 1).read(KEY).unwrap()
-}
-
-pub(crate) fn models(dataset: &Dataset, objects: &[u32]) -> Models {
-    let folder = ModelFolder::open(dataset.models_dir().unwrap()).unwrap();
-    Models::read(&folder, &objects.iter().copied().collect::<BTreeSet<u32>>())
-}
+use crate::common::{BLOCK, KEY, World, estimate, mask, truth};
 
 fn detection(mask: Option<&Mask>) -> Detection {
     Detection {
@@ -124,12 +27,10 @@ fn detection(mask: Option<&Mask>) -> Detection {
 
 #[test]
 fn rows_are_refined() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = dataset(dir.path());
-    let objects = models(&dataset, &[BLOCK, 9]);
+    let world = World::new();
     let shared = DatasetRefiner {
-        models: objects,
-        scenes: Scenes::new(&dataset, "test", 1),
+        scenes: world.scenes(),
+        models: world.models,
         masks: MaskSource::Visible,
     };
     let mut rows = vec![
@@ -158,17 +59,15 @@ fn rows_are_refined() {
 
 #[test]
 fn masks_come_from_their_source() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = dataset(dir.path());
-    let models = models(&dataset, &[BLOCK]);
-    let model = &models.by_id[&BLOCK];
+    let world = World::new();
+    let model = world.model();
     let mut refiner = Refiner::preset(Preset::Hybrid);
     let aside = Isometry3::translation(1.0, 0.0, 0.0) * truth();
     let detections = vec![detection(None), detection(Some(&mask()))];
     let detections = MaskSource::detections(detections);
     for mut frame in [
-        MaskSource::Visible.frame(KEY, image(&dataset)),
-        detections.frame(KEY, image(&dataset)),
+        MaskSource::Visible.frame(KEY, world.image()),
+        detections.frame(KEY, world.image()),
     ] {
         let chosen = frame.choose(&mut refiner, model, BLOCK, &[aside, estimate()]);
         assert_eq!(chosen[0], Err(RowStatus::NoOverlap));
@@ -177,7 +76,7 @@ fn masks_come_from_their_source() {
         assert_eq!(frame.into_faults(), []);
     }
     let boxes = MaskSource::Box(BoxMask::default());
-    let mut frame = boxes.frame(KEY, image(&dataset));
+    let mut frame = boxes.frame(KEY, world.image());
     let none = frame.choose(&mut refiner, model, BLOCK, &[estimate()]);
     assert_eq!(none, [Err(RowStatus::NoMask)]);
     // Only the block was measured, so the box around the estimate contains the whole mask.
@@ -193,10 +92,8 @@ fn masks_come_from_their_source() {
 /// A short run-length code may describe a whole image, so the number of masks in memory is limited.
 #[test]
 fn released_masks_are_read_again_with_the_same_results() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = dataset(dir.path());
-    let models = models(&dataset, &[BLOCK]);
-    let model = &models.by_id[&BLOCK];
+    let world = World::new();
+    let model = world.model();
     let mut refiner = Refiner::preset(Preset::Hybrid);
     let left: Vec<bool> = (0..160 * 120).map(|i| i % 160 < 80).collect();
     let left = Mask::new(160, 120, left).unwrap();
@@ -207,7 +104,7 @@ fn released_masks_are_read_again_with_the_same_results() {
     let detections = MaskSource::detections(detections);
     let poses = [truth(), estimate(), truth()];
     let mut run = |memory: Option<usize>| {
-        let mut frame = detections.frame(KEY, image(&dataset));
+        let mut frame = detections.frame(KEY, world.image());
         if let Some(memory) = memory {
             frame = frame.with_memory(memory);
         }
@@ -233,18 +130,12 @@ fn released_masks_are_read_again_with_the_same_results() {
 
 #[test]
 fn an_unusable_mask_is_reported_as_a_fault() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = dataset(dir.path());
-    let small = Mask::new(16, 12, vec![true; 16 * 12]).unwrap();
-    write_mask_png(
-        dir.path().join("test/000001/mask_visib/000004_000000.png"),
-        &small,
-    )
-    .unwrap();
-    let models = models(&dataset, &[BLOCK]);
+    let world = World::new();
+    let path = world.path("test/000001/mask_visib/000004_000000.png");
+    write_mask_png(path, &Mask::full(16, 12)).unwrap();
     let mut refiner = Refiner::preset(Preset::Hybrid);
-    let mut frame = MaskSource::Visible.frame(KEY, image(&dataset));
-    let chosen = frame.choose(&mut refiner, &models.by_id[&BLOCK], BLOCK, &[truth()]);
+    let mut frame = MaskSource::Visible.frame(KEY, world.image());
+    let chosen = frame.choose(&mut refiner, world.model(), BLOCK, &[truth()]);
     assert_eq!(chosen, [Err(RowStatus::Damaged)]);
     let faults = frame.into_faults();
     assert!(
@@ -255,15 +146,13 @@ fn an_unusable_mask_is_reported_as_a_fault() {
 
 #[test]
 fn a_missing_mask_is_reported_as_a_fault_that_names_it() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = dataset(dir.path());
-    let models = models(&dataset, &[BLOCK]);
+    let world = World::new();
     let mut refiner = Refiner::preset(Preset::Hybrid);
-    let scene = dir.path().join("test/000001");
+    let scene = world.path("test/000001");
     let mut missing = |name: &str| {
         std::fs::remove_file(scene.join(name)).unwrap();
-        let mut frame = MaskSource::Visible.frame(KEY, image(&dataset));
-        let chosen = frame.choose(&mut refiner, &models.by_id[&BLOCK], BLOCK, &[truth()]);
+        let mut frame = MaskSource::Visible.frame(KEY, world.image());
+        let chosen = frame.choose(&mut refiner, world.model(), BLOCK, &[truth()]);
         assert_eq!(chosen, [Err(RowStatus::NoMask)]);
         let faults = frame.into_faults();
         assert!(
@@ -290,13 +179,13 @@ fn detections_are_grouped_by_image() {
 
 #[test]
 fn limits_and_errors_are_reported_as_faults() {
-    let dir = tempfile::tempdir().unwrap();
+    let world = World::new();
     let limits = ReadLimits {
         max_triangles: 3,
         max_pixels: 5,
         ..ReadLimits::DEFAULT
     };
-    let dataset = dataset(dir.path()).with_limits(limits);
+    let dataset = world.dataset.with_limits(limits);
     let folder = ModelFolder::open(dataset.models_dir().unwrap()).unwrap();
     assert!(folder.read(BLOCK).unwrap().is_some());
     let folder = ModelFolder::open_within(limits, dataset.models_dir().unwrap()).unwrap();
@@ -318,12 +207,10 @@ fn limits_and_errors_are_reported_as_faults() {
 
 #[test]
 fn the_observations_of_an_image_share_its_depth() {
-    let folder = tempfile::tempdir().unwrap();
-    let dataset = dataset(folder.path());
-    let image = image(&dataset);
+    let world = World::new();
+    let model = world.model();
+    let image = world.image();
     let depth = Arc::clone(&image.depth);
-    let read = models(&dataset, &[BLOCK]);
-    let model = &read.by_id[&BLOCK];
     let mut refiner = Refiner::preset(Preset::Hybrid);
 
     let mut frame = MaskSource::Visible.frame(KEY, image);
