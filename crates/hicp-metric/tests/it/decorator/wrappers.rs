@@ -22,6 +22,13 @@ struct Spy<M> {
     seen: Seen,
 }
 
+impl<M> Spy<M> {
+    fn record(&self, iteration: &Iteration<'_>) {
+        let seen = (iteration.index, iteration.init);
+        self.seen.borrow_mut().push(seen);
+    }
+}
+
 impl<M: Minimize> Minimize for Spy<M> {
     fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
         Some(&mut self.metric)
@@ -32,16 +39,12 @@ impl<M: Minimize> Minimize for Spy<M> {
         iteration: &Iteration<'_>,
         pairs: &Correspondences,
     ) -> Option<NormalEquations> {
-        self.seen
-            .borrow_mut()
-            .push((iteration.index, iteration.init));
+        self.record(iteration);
         self.metric.system(iteration, pairs)
     }
 
     fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
-        self.seen
-            .borrow_mut()
-            .push((iteration.index, iteration.init));
+        self.record(iteration);
         self.metric.mean_loss(iteration, pairs)
     }
 
@@ -52,9 +55,7 @@ impl<M: Minimize> Minimize for Spy<M> {
         factor: f64,
         errors: &mut [f64],
     ) {
-        self.seen
-            .borrow_mut()
-            .push((iteration.index, iteration.init));
+        self.record(iteration);
         self.metric
             .add_squared_errors(iteration, pairs, factor, errors);
     }
