@@ -12,7 +12,7 @@ use hicp_sim::{Lighting, Texture, stream};
 use hicp_tests::painted::Painted;
 use hicp_tests::tabletop::MaskKind;
 use hicp_tests::{household, mean, median, points_of};
-use hybrid_icp::core::{ColorImage, Isometry3, Observation};
+use hybrid_icp::core::{ColorImage, Isometry3, Observation, PixelRegion};
 use hybrid_icp::icp::Alternative;
 use hybrid_icp::{Preset, Refinement, Refiner, presets};
 
@@ -194,7 +194,7 @@ fn processor_time() -> f64 {
 fn spoil(color: &ColorImage, fault: &str) -> ColorImage {
     let (width, height) = (color.width(), color.height());
     let at = |u: u32, v: u32| color.get(u % width, v % height).unwrap_or_default();
-    let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
+    let pixels = PixelRegion::of_image(width, height).pixels();
     let pixels = pixels.map(|(u, v)| match fault {
         "other" => at(width - 1 - u, height - 1 - v),
         "swapped" => {

@@ -19,8 +19,8 @@ use hicp_io::bop::Dataset;
 use hicp_sim::{Household, perturb, stream};
 use hicp_tests::tabletop::{MaskKind, Tabletop};
 use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Quaternion, Translation3,
-    TriMesh, UnitQuaternion, Vector3,
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, PixelRegion, Quaternion,
+    Translation3, TriMesh, UnitQuaternion, Vector3,
 };
 use hybrid_icp::{Diagnosis, Fault, Preset, Refiner};
 use rand::RngExt;
@@ -154,7 +154,7 @@ impl Inputs {
     /// Replaces the depth at every pixel; `new` receives its column, row and depth (0 if missing).
     fn depths(mut self, new: impl Fn(u32, u32, f64) -> f64) -> Self {
         let (width, height) = (self.depth.width(), self.depth.height());
-        let places = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
+        let places = PixelRegion::of_image(width, height).pixels();
         let depths = places.zip(self.depth.pixels());
         let depths = depths.map(|((u, v), z)| new(u, v, f64::from(*z)) as f32);
         self.depth = Arc::new(DepthImage::collect(width, height, depths).expect("sizes agree"));

@@ -11,11 +11,12 @@ pub mod ycbv;
 
 use std::sync::Arc;
 
-use hicp_sim::{Household, RelativeGaussian, SimRng, object_pose};
+use hicp_sim::{Household, RelativeGaussian, SimRng, object_pose, perturb};
 use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Symmetries, se3,
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, Symmetries, se3,
 };
-use hybrid_icp::raster::render_depth_image;
+use hybrid_icp::icp::{Observer, Outcome, Session, Stage, Workspace};
+use hybrid_icp::raster::{Rasterizer, render_depth_image};
 use hybrid_icp::score::ModelPoints;
 
 use crate::tabletop::Tabletop;
@@ -57,6 +58,23 @@ impl Scene {
         .expect("sizes agree")
     }
 
+    /// Returns the problem of finding the object in its view.
+    pub fn problem(&self) -> Problem<'_> {
+        Problem::new(&self.model, &self.observation)
+    }
+
+    /// Runs a stage in a new workspace.
+    pub fn run(
+        &self,
+        stage: &mut dyn Stage,
+        init: &Isometry3<f64>,
+        observer: &mut dyn Observer,
+    ) -> Outcome {
+        let mut workspace = Workspace::new(Rasterizer::default());
+        let mut session = Session::new(&mut workspace, observer);
+        stage.run(&self.problem(), init, &mut session)
+    }
+
     /// Returns the same view with an upright, flat bar in front of the object.
     ///
     /// The bar covers a `share` of the mask's width around its middle, and is `meters` nearer than
@@ -64,33 +82,26 @@ impl Scene {
     ///
     /// If `masked`, the mask includes the bar, as detectors do with hands and grippers.
     pub fn behind_a_bar(&self, share: f64, meters: f32, masked: bool) -> Observation {
-        let (width, height) = (
-            self.observation.camera().width(),
-            self.observation.camera().height(),
-        );
-        let region = self.observation.mask().bounding_region();
+        let camera = *self.observation.camera();
+        let (width, height) = (camera.width(), camera.height());
+        let mask = self.observation.mask();
+        let region = mask.bounding_region();
         let half = region.width() as f64 * share / 2.0;
         let middle = f64::from(region.u_min + region.u_max) / 2.0;
-        let on_bar = |i: usize| {
-            let (u, v) = (i as u32 % width, i as u32 / width);
-            region.contains(u, v) && (f64::from(u) - middle).abs() < half
-        };
+        let on_bar = |u: u32, v: u32| region.contains(u, v) && (f64::from(u) - middle).abs() < half;
         let depth = self.observation.depth().pixels();
         let nearest = depth
             .iter()
             .copied()
             .filter(|z| *z > 0.0)
             .fold(f32::INFINITY, f32::min);
-        let depth = depth.iter().enumerate();
-        let depth = depth.map(|(i, z)| if on_bar(i) { nearest - meters } else { *z });
-        let mask = self.observation.mask().pixels().iter().enumerate();
-        let mask = mask.map(|(i, on)| *on && (masked || !on_bar(i)));
-        Observation::new(
-            DepthImage::from_meters(width, height, depth.collect()).expect("sizes agree"),
-            Mask::new(width, height, mask.collect()).expect("sizes agree"),
-            *self.observation.camera(),
-        )
-        .expect("sizes agree")
+        let depth = camera.region().pixels().zip(depth);
+        let depth = depth.map(|((u, v), z)| if on_bar(u, v) { nearest - meters } else { *z });
+        let depth = DepthImage::collect(width, height, depth).expect("sizes agree");
+        let mask = Mask::in_region(width, height, &region, |u, v| {
+            mask.get(u, v) == Some(true) && (masked || !on_bar(u, v))
+        });
+        Observation::new(depth, mask, camera).expect("sizes agree")
     }
 }
 
@@ -159,6 +170,19 @@ pub fn scene(object: Household, noise_percent: f64, rng: &mut SimRng) -> Scene {
         model,
         truth,
     }
+}
+
+/// Creates a [`scene`], and an initial pose that is off by a distance (meters) and an angle
+/// (radians).
+pub fn perturbed_scene(
+    object: Household,
+    noise_percent: f64,
+    rng: &mut SimRng,
+    (meters, radians): (f64, f64),
+) -> (Scene, Isometry3<f64>) {
+    let scene = scene(object, noise_percent, rng);
+    let init = perturb(rng, &scene.truth, meters, radians);
+    (scene, init)
 }
 
 /// Returns the rotation (radians) and translation (meters) error, up to the declared symmetries.

@@ -1,7 +1,7 @@
 //! The paper's starts (6.2 mm, 9.5° off) on synthetic objects, and a pipeline's results on them.
 
 use hicp_sim::{perturb_by_mean, rng};
-use hybrid_icp::core::{Isometry3, Problem};
+use hybrid_icp::core::Isometry3;
 use hybrid_icp::icp::{Session, Stage, Verdict, Workspace};
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
@@ -67,7 +67,7 @@ pub fn measure_stage(stage: &mut dyn Stage, starts: &[Start]) -> Row {
     let (mut degrees, mut millimeters, mut iterations) = (Vec::new(), Vec::new(), Vec::new());
     let mut kept = 0.0;
     for Start { scene, init } in starts {
-        let problem = Problem::new(&scene.model, &scene.observation);
+        let problem = scene.problem();
         let outcome = stage.run(&problem, init, &mut Session::new(&mut workspace, &mut ()));
         let (angle, distance) = symmetric_pose_distance(
             &outcome.camera_from_object,

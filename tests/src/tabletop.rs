@@ -194,7 +194,7 @@ impl Tabletop {
                 depth: view.depth.clone(),
                 mask: object.visible.clone(),
             };
-            if count(&case.mask) < LEAST_PIXELS {
+            if case.mask.n_set() < LEAST_PIXELS {
                 continue;
             }
             let corruption = Corruption {
@@ -203,8 +203,8 @@ impl Tabletop {
                 ..Corruption::default()
             };
             let (depth, visible) = corruption.apply(&case)?;
-            let visible_share = count(&visible) as f64 / count(&object.silhouette) as f64;
-            if count(&visible) < LEAST_PIXELS || visible_share < LEAST_VISIBLE {
+            let visible_share = visible.n_set() as f64 / object.silhouette.n_set() as f64;
+            if visible.n_set() < LEAST_PIXELS || visible_share < LEAST_VISIBLE {
                 continue;
             }
             seen.push(Seen {
@@ -267,12 +267,11 @@ impl Seen {
         let normal = Vector3::new(slope * cos, slope * sin, 1.0);
         let distance = normal.dot(&self.truth.translation.vector);
         let (width, height) = (self.depth.width(), self.depth.height());
-        let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
-        let wall = pixels.map(|(u, v)| {
+        let wall = self.camera.region().pixels().map(|(u, v)| {
             let ray = self.camera.unproject(f64::from(u), f64::from(v), 1.0);
             (distance / normal.dot(&ray.coords)) as f32
         });
-        let wall = DepthImage::from_meters(width, height, wall.collect())?;
+        let wall = DepthImage::collect(width, height, wall)?;
         let depth = self.sensor.measure(random, &wall, &self.camera)?;
         Ok(Self {
             depth: Arc::new(depth),
@@ -295,10 +294,6 @@ impl Seen {
         let center = self.truth * own.center();
         Isometry3::from_parts((center - turn * model.center()).into(), turn)
     }
-}
-
-fn count(mask: &Mask) -> usize {
-    mask.n_set()
 }
 
 /// A sensor with independent noise, percent of the depth.

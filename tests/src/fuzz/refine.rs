@@ -198,7 +198,7 @@ fn depth(
 fn mask(bytes: &mut Bytes<'_>, depth: &DepthImage) -> Option<Mask> {
     let (width, height) = (depth.width(), depth.height());
     let pixels = match bytes.below(3) {
-        0 => depth.pixels().iter().map(|z| *z > 0.0).collect(),
+        0 => return Some(Mask::measured(depth)),
         1 => return Some(Mask::full(width, height)),
         _ => {
             let pattern = bytes.array::<16>();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::allocations::allocations;
-use hicp_tests::scene;
+use hicp_tests::{perturbed_scene, scene};
 use hybrid_icp::core::{Isometry3, Vector3};
 use hybrid_icp::fusion::{CameraMotion, FusionMethod};
 use hybrid_icp::pipeline::PipelineFile;
@@ -88,9 +88,7 @@ fn stage_with(part: &Part) -> Option<String> {
 
 #[test]
 fn every_warm_component_of_the_catalog_allocates_nothing() {
-    let mut rng = rng(5);
-    let scene = scene(Household::Mug, 1.0, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
+    let (scene, init) = perturbed_scene(Household::Mug, 1.0, &mut rng(5), (0.004, 0.08));
     let mut tried = 0;
     for part in Catalog::built_in().parts() {
         let Some(text) = stage_with(part) else {
@@ -111,10 +109,8 @@ fn every_warm_component_of_the_catalog_allocates_nothing() {
 
 #[test]
 fn a_warm_step_of_the_sequential_estimator_allocates_nothing() {
-    let mut rng = rng(7);
     // A bottle has symmetries, which the estimator also uses.
-    let scene = scene(Household::Bottle, 1.0, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
+    let (scene, init) = perturbed_scene(Household::Bottle, 1.0, &mut rng(7), (0.004, 0.08));
     let uncertain = CameraMotion::none()
         .with_covariance(&(hybrid_icp::core::Matrix6::identity() * 1e-8))
         .expect("a covariance");

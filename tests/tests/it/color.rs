@@ -1,7 +1,6 @@
 //! The agreement of colors, and the choice by color.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use hicp_sim::{Household, Lighting, Texture, stream};
 use hicp_tests::painted::Painted;
@@ -51,19 +50,18 @@ pub(crate) fn photograph(model: &Model, change: impl Fn([f32; 3]) -> [f32; 3]) -
     let mut view = RenderedView::default();
     let mesh = model.mesh();
     Rasterizer::default().render(mesh, &camera, &pose(), &camera.region(), &mut view);
-    let pixels = (0..120).flat_map(|v| (0..160).map(move |u| (u, v)));
     let color = |(u, v)| {
         view.color_at(u, v, mesh, &camera, &pose())
             .unwrap_or_default()
     };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let byte = |value: f32| value.round() as u8;
-    let colors = pixels.clone().map(|pixel| change(color(pixel)).map(byte));
+    let pixels = || camera.region().pixels();
+    let colors = pixels().map(|pixel| change(color(pixel)).map(byte));
     let colors = ColorImage::new(160, 120, colors.collect()).unwrap();
-    let depth = pixels.map(|(u, v)| view.depth_at(u, v)).collect();
-    let depth = Arc::new(DepthImage::from_meters(160, 120, depth).unwrap());
-    let seen = depth.pixels().iter().map(|z| *z > 0.0).collect();
-    let mask = Mask::new(160, 120, seen).unwrap();
+    let depth = pixels().map(|(u, v)| view.depth_at(u, v));
+    let depth = DepthImage::collect(160, 120, depth).unwrap();
+    let mask = Mask::measured(&depth);
     let observation = Observation::new(depth, mask, camera).unwrap();
     observation.with_color(colors).unwrap()
 }

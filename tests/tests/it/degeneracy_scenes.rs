@@ -32,14 +32,11 @@ fn camera() -> PinholeCamera {
 /// Returns an observation of the depth that a function gives for the slopes (x/z, y/z) of a ray.
 fn observe(depth: impl Fn(f64, f64) -> f64) -> Observation {
     let camera = camera();
-    let mut meters = Vec::new();
-    for v in 0..camera.height() {
-        for u in 0..camera.width() {
-            let ray = camera.unproject(f64::from(u), f64::from(v), 1.0);
-            meters.push(depth(ray.x, ray.y) as f32);
-        }
-    }
-    let image = DepthImage::from_meters(camera.width(), camera.height(), meters).unwrap();
+    let meters = camera.region().pixels().map(|(u, v)| {
+        let ray = camera.unproject(f64::from(u), f64::from(v), 1.0);
+        depth(ray.x, ray.y) as f32
+    });
+    let image = DepthImage::collect(camera.width(), camera.height(), meters).unwrap();
     let mask = Mask::full(camera.width(), camera.height());
     Observation::new(image, mask, camera).unwrap()
 }

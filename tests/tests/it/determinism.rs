@@ -1,7 +1,7 @@
 //! Checks that a pipeline returns the same bits in a second run, from a box, and on other threads.
 
-use hicp_sim::{Household, perturb, rng};
-use hicp_tests::{Scene, scene};
+use hicp_sim::{Household, rng};
+use hicp_tests::{Scene, perturbed_scene};
 use hybrid_icp::association::{
     AllSamples, DataAssociation, NearestNeighbor, OutlierFilter, PointSelection, Projective,
     VisibleSurface,
@@ -18,11 +18,7 @@ fn cases() -> Vec<(Scene, Isometry3<f64>)> {
     [Household::Mug, Household::Hammer, Household::Carton]
         .into_iter()
         .flat_map(|object| [(object, 0.005, 0.1), (object, 0.07, 1.0)])
-        .map(|(object, translation, angle)| {
-            let scene = scene(object, 1.0, &mut rng);
-            let init = perturb(&mut rng, &scene.truth, translation, angle);
-            (scene, init)
-        })
+        .map(|(object, meters, angle)| perturbed_scene(object, 1.0, &mut rng, (meters, angle)))
         .collect()
 }
 

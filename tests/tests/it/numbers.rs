@@ -56,13 +56,11 @@ fn scene() -> Scene {
     let mesh = cuboid([0.1, 0.06, 0.04]);
     let truth = Isometry3::new([0.01, -0.005, 0.4].into(), [0.6, -0.4, 0.3].into());
     let depth = render_depth_image(&mesh, &camera(), &truth);
-    let pixels = depth.pixels().iter().map(|z| *z > 0.0).collect();
-    let mask = Mask::new(160, 120, pixels).unwrap();
     Scene {
         model: Model::new(mesh),
         truth,
+        mask: Mask::measured(&depth),
         depth,
-        mask,
     }
 }
 

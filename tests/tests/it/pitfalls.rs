@@ -10,33 +10,20 @@ use hybrid_icp::association::{AllSamples, DataAssociation, Projective, VisibleSu
 use hybrid_icp::core::Iteration;
 use hybrid_icp::core::{
     Context, Correspondences, DepthImage, Isometry3, Mask, Observation, Pair, PinholeCamera,
-    Problem, RigidTransform, Surfel, UnitVector3, Vector3, se3,
+    RigidTransform, Surfel, UnitVector3, Vector3, se3,
 };
 use hybrid_icp::icp::{
-    Convergence, Icp, IterationEvent, IterationLimit, Observer, Outcome, Quality, Session, Stage,
-    StageEvent, Verdict, Workspace,
+    Convergence, Icp, IterationEvent, IterationLimit, Observer, Quality, StageEvent, Verdict,
 };
 use hybrid_icp::metric::{
     GaussNewton, Generalized, LevenbergMarquardt, Minimize, PlaneToPoint, PointToPlane,
     PointToPoint, Symmetric,
 };
-use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::{BoxedStage, Preset, Refiner};
 
 fn bits(pose: &Isometry3<f64>) -> [u64; 7] {
     let (t, q) = (pose.translation.vector, pose.rotation.coords);
     [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
-}
-
-fn run(
-    stage: &mut dyn Stage,
-    scene: &Scene,
-    init: &Isometry3<f64>,
-    observer: &mut dyn Observer,
-) -> Outcome {
-    let mut workspace = Workspace::new(Rasterizer::default());
-    let problem = Problem::new(&scene.model, &scene.observation);
-    stage.run(&problem, init, &mut Session::new(&mut workspace, observer))
 }
 
 /// Without a pair there is nothing to measure. A perfect 0 or an identity pose would be false.
@@ -56,7 +43,7 @@ fn without_pairs_there_is_no_quality_and_the_initial_pose_stays() {
     };
     let init = perturb(&mut rng(32), &unseen.truth, 0.01, 0.2);
     for preset in Preset::ALL {
-        let outcome = run(&mut *preset.build(), &unseen, &init, &mut ());
+        let outcome = unseen.run(&mut *preset.build(), &init, &mut ());
         assert_eq!(bits(&outcome.camera_from_object), bits(&init), "{preset}");
         assert!(
             matches!(outcome.verdict, Verdict::KeptInitial(_)),
@@ -164,7 +151,7 @@ fn the_returned_pose_moves_points_onto_their_targets_far_from_the_origin() {
                 metric,
                 stop: (Convergence::default(), IterationLimit(40)),
             };
-            let outcome = run(&mut stage, &scene, &init, &mut ());
+            let outcome = scene.run(&mut stage, &init, &mut ());
             assert!(outcome.iterations > 2, "{name}: more than one step");
             let found = outcome.camera_from_object;
             let off = scene.model.samples().iter().map(|s| {
@@ -208,7 +195,7 @@ fn the_initial_pose_is_evaluated_first_and_the_returned_pose_was_evaluated() {
         let init = perturb(&mut rng(50 + seed), &scene.truth, 0.006, 0.12);
         for preset in Preset::ALL {
             let mut seen = Evaluations::default();
-            let outcome = run(&mut *preset.build(), &scene, &init, &mut seen);
+            let outcome = scene.run(&mut *preset.build(), &init, &mut seen);
             assert_eq!(seen.poses[0].0, bits(&init), "{preset}");
             let claimed = (
                 bits(&outcome.camera_from_object),
@@ -259,8 +246,8 @@ fn a_scaled_scene_is_refined_alike() {
                 truth: scaled(&small.truth),
             };
             for preset in Preset::ALL {
-                let here = run(&mut *preset.build(), &small, &init, &mut ());
-                let there = run(&mut *preset.build(), &large, &scaled(&init), &mut ());
+                let here = small.run(&mut *preset.build(), &init, &mut ());
+                let there = large.run(&mut *preset.build(), &scaled(&init), &mut ());
                 assert_eq!(there.iterations, here.iterations, "{preset} × {factor}");
                 assert_eq!(there.termination, here.termination, "{preset} × {factor}");
                 let expected = scaled(&here.camera_from_object);
@@ -344,10 +331,8 @@ fn a_half_hidden_object_at_its_true_pose_stays_there() {
         let middle = u32::midpoint(region.u_min, region.u_max);
         let (width, height) = (camera().width(), camera().height());
         let whole = scene.observation.mask().pixels();
-        let half = (0..height)
-            .flat_map(|v| (0..width).map(move |u| (u, v)))
-            .zip(whole)
-            .map(|((u, _), masked)| *masked && u < middle);
+        let pixels = camera().region().pixels().zip(whole);
+        let half = pixels.map(|((u, _), masked)| *masked && u < middle);
         let mask = Mask::new(width, height, half.collect()).unwrap();
         let depth = scene.observation.depth().clone();
         let observation = Observation::new(depth, mask, camera()).unwrap();

@@ -1,7 +1,7 @@
 //! Stages made of stages: acceleration, schedules, guards, and the numbers at the returned pose.
 
-use hicp_sim::{Household, SimRng, perturb, rng};
-use hicp_tests::{Scene, scene};
+use hicp_sim::{Household, rng};
+use hicp_tests::{Scene, perturbed_scene};
 use hybrid_icp::association::{
     AllSamples, MaxDistance, NearestNeighbor, OutlierFilter, Projective, Schedule, VisibleSurface,
 };
@@ -9,7 +9,7 @@ use hybrid_icp::core::Iteration;
 use hybrid_icp::core::{Correspondences, Isometry3, Problem};
 use hybrid_icp::icp::{
     Anderson, Cascade, Guard, Icp, IterationEvent, IterationLimit, KeepBest, Observer, Outcome,
-    Quality, Regime, Session, SmallMotion, Stage, StageEvent, Termination, Verdict, Workspace,
+    Quality, Regime, SmallMotion, Stage, StageEvent, Termination, Verdict, Workspace,
 };
 use hybrid_icp::metric::{PointToPlane, PointToPoint};
 use hybrid_icp::raster::Rasterizer;
@@ -17,17 +17,8 @@ use hybrid_icp::score::MeanVsd;
 use hybrid_icp::switch::{Switch, SwitchAmong, Thresholds};
 use hybrid_icp::{Preset, Refiner, presets};
 
-fn case(object: Household, seed: u64, translation: f64, angle: f64) -> (Scene, Isometry3<f64>) {
-    let mut rng: SimRng = rng(seed);
-    let scene = scene(object, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, translation, angle);
-    (scene, init)
-}
-
-fn run(stage: &mut dyn Stage, scene: &Scene, init: &Isometry3<f64>) -> Outcome {
-    let mut workspace = Workspace::new(Rasterizer::default());
-    let problem = Problem::new(&scene.model, &scene.observation);
-    stage.run(&problem, init, &mut Session::new(&mut workspace, &mut ()))
+fn case(object: Household, seed: u64, meters: f64, angle: f64) -> (Scene, Isometry3<f64>) {
+    perturbed_scene(object, 0.5, &mut rng(seed), (meters, angle))
 }
 
 fn slow_icp<S>(stop: S) -> Icp<AllSamples, NearestNeighbor, (), PointToPoint, S> {
@@ -63,7 +54,7 @@ fn anderson_reaches_a_loss_in_fewer_steps_than_plain_iteration() {
         let mut pose = init;
         let mut losses = Vec::new();
         for _ in 0..60 {
-            let outcome = run(&mut slow_icp(IterationLimit(2)), &scene, &pose);
+            let outcome = scene.run(&mut slow_icp(IterationLimit(2)), &pose, &mut ());
             let Some(evaluation) = outcome.evaluation else {
                 break;
             };
@@ -72,15 +63,9 @@ fn anderson_reaches_a_loss_in_fewer_steps_than_plain_iteration() {
         }
         let reached = losses.iter().copied().fold(f64::INFINITY, f64::min) * 1.001;
         plain_steps += losses.iter().position(|l| *l <= reached).unwrap() + 1;
-        let problem = Problem::new(&scene.model, &scene.observation);
-        let mut workspace = Workspace::new(Rasterizer::default());
         let mut steps = StepLosses::default();
         let mut fast = Anderson::new(slow_icp(IterationLimit(2)));
-        fast.run(
-            &problem,
-            &init,
-            &mut Session::new(&mut workspace, &mut steps),
-        );
+        scene.run(&mut fast, &init, &mut steps);
         let position = steps.0.iter().position(|l| *l <= reached);
         fast_steps += position.map_or(60, |index| index + 1);
     }
@@ -94,12 +79,12 @@ fn anderson_reaches_a_loss_in_fewer_steps_than_plain_iteration() {
 fn anderson_never_returns_a_higher_loss_than_its_first_step() {
     for seed in 0..6 {
         let (scene, init) = case(Household::Car, seed, 0.01, 0.3);
-        let first = run(&mut slow_icp(IterationLimit(2)), &scene, &init);
+        let first = scene.run(&mut slow_icp(IterationLimit(2)), &init, &mut ());
         let mut fast = Anderson::new(slow_icp(IterationLimit(2)));
-        let outcome = run(&mut fast, &scene, &init);
+        let outcome = scene.run(&mut fast, &init, &mut ());
         let loss = |o: &Outcome| o.evaluation.map_or(f64::INFINITY, |e| e.mean_loss);
         assert!(loss(&outcome) <= loss(&first), "{outcome:?}");
-        assert_eq!(run(&mut fast, &scene, &init), outcome, "pure");
+        assert_eq!(scene.run(&mut fast, &init, &mut ()), outcome, "pure");
     }
 }
 
@@ -125,15 +110,9 @@ fn a_schedule_applies_one_filter_per_iteration_and_restarts_with_each_run() {
         metric: PointToPoint,
         stop: (IterationLimit(6),),
     };
-    let problem = Problem::new(&scene.model, &scene.observation);
-    let mut workspace = Workspace::new(Rasterizer::default());
-    let mut record = |stage: &mut dyn Stage| {
+    let record = |stage: &mut dyn Stage| {
         let mut counts = PairCounts::default();
-        let outcome = stage.run(
-            &problem,
-            &init,
-            &mut Session::new(&mut workspace, &mut counts),
-        );
+        let outcome = scene.run(stage, &init, &mut counts);
         (counts.0, outcome)
     };
     let (counts, outcome) = record(&mut stage);
@@ -153,7 +132,7 @@ fn after_a_rollback_the_quality_is_that_of_the_returned_pose() {
     for seed in 0..12 {
         let (scene, init) = case(Household::Hammer, seed, 0.004, 0.1);
         let mut stage = presets::projective_point_to_plane();
-        let outcome = run(&mut stage, &scene, &init);
+        let outcome = scene.run(&mut stage, &init, &mut ());
         rolled_back += usize::from(matches!(
             outcome.termination,
             Termination::PairsLost | Termination::LossIncreased
@@ -162,7 +141,7 @@ fn after_a_rollback_the_quality_is_that_of_the_returned_pose() {
             continue;
         };
         // The same points, associated again at the returned pose, must give the same pairs.
-        let problem = Problem::new(&scene.model, &scene.observation);
+        let problem = scene.problem();
         let mut workspace = Workspace::new(Rasterizer::default());
         let mut context = workspace.context(&problem);
         let mut source = Vec::new();
@@ -246,7 +225,10 @@ fn a_switch_among_two_stages_equals_the_switch() {
         ],
     };
     for pose in [scene.truth, init] {
-        assert_eq!(run(&mut many, &scene, &pose), run(&mut two, &scene, &pose));
+        assert_eq!(
+            scene.run(&mut many, &pose, &mut ()),
+            scene.run(&mut two, &pose, &mut ())
+        );
     }
     let mut beyond = SwitchAmong {
         switcher: Regime(7),
@@ -254,8 +236,8 @@ fn a_switch_among_two_stages_equals_the_switch() {
     };
     let mut last = Preset::NnPointToPoint.build();
     assert_eq!(
-        run(&mut beyond, &scene, &init),
-        run(&mut *last, &scene, &init)
+        scene.run(&mut beyond, &init, &mut ()),
+        scene.run(&mut *last, &init, &mut ())
     );
 }
 
@@ -286,17 +268,11 @@ fn an_observer_can_stop_a_stage() {
         slow_icp(SmallMotion::default()),
         slow_icp(SmallMotion::default()),
     ));
-    let problem = Problem::new(&scene.model, &scene.observation);
-    let mut workspace = Workspace::new(Rasterizer::default());
     let mut observer = StopAfter {
         after: 2,
         ended: Vec::new(),
     };
-    let outcome = stage.run(
-        &problem,
-        &init,
-        &mut Session::new(&mut workspace, &mut observer),
-    );
+    let outcome = scene.run(&mut stage, &init, &mut observer);
     assert_eq!(observer.ended, [Termination::Stopped; 2]);
     assert_eq!(
         (outcome.termination, outcome.iterations),

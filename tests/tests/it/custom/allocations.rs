@@ -4,9 +4,9 @@
 
 use super::association::SoftProjective;
 use super::metric::AlongRay;
-use hicp_sim::{Household, perturb, rng};
+use hicp_sim::{Household, rng};
 use hicp_tests::allocations::allocations;
-use hicp_tests::scene;
+use hicp_tests::perturbed_scene;
 use hybrid_icp::Refiner;
 use hybrid_icp::association::{DataAssociation, VisibleSurface};
 use hybrid_icp::core::{Context, Correspondences, Isometry3, Surfel};
@@ -15,9 +15,7 @@ use hybrid_icp::metric::{PointToPlane, WeightedSum};
 
 /// Returns the allocations and iterations of the second of two equal refinements.
 fn warm_allocations(association: impl DataAssociation + Send + 'static) -> (u64, u64) {
-    let mut rng = rng(3);
-    let scene = scene(Household::Mug, 1.0, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.004, 0.08);
+    let (scene, init) = perturbed_scene(Household::Mug, 1.0, &mut rng(3), (0.004, 0.08));
     let along_ray = AlongRay { min_cosine: 0.2 };
     let mut refiner = Refiner::new(Icp {
         selection: VisibleSurface::default(),

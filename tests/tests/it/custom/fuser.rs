@@ -1,8 +1,8 @@
 //! A custom fuser: covariance intersection, for estimates that share errors.
 
-use hicp_sim::{Household, perturb, rng};
+use hicp_sim::{Household, rng};
 use hicp_testkit::{FuserLaws, check_fuser};
-use hicp_tests::{camera, render, scene};
+use hicp_tests::{camera, perturbed_scene, render};
 use hybrid_icp::core::{Isometry3, Matrix6, Observation, Vector6, se3};
 use hybrid_icp::fusion::{
     CameraMotion, Failure, Fuser, FuserConfig, Fusion, PoseEstimate, RecursiveFuser, Solution,
@@ -138,9 +138,7 @@ fn the_same_estimate_again_is_no_new_evidence() {
 
 #[test]
 fn the_sequential_estimator_runs_with_it() {
-    let mut rng = rng(5);
-    let scene = scene(Household::Iron, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.01, 0.1);
+    let (scene, init) = perturbed_scene(Household::Iron, 0.5, &mut rng(5), (0.01, 0.1));
     let mut estimator = SequentialEstimator::new(
         Preset::Hybrid.build(),
         CovarianceIntersection::default(),

@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use hicp_sim::{Household, perturb, rng};
-use hicp_tests::scene;
+use hicp_sim::{Household, rng};
+use hicp_tests::{perturbed_scene, scene};
 use hybrid_icp::core::{Isometry3, se3};
 use hybrid_icp::icp::{
     DecisionEvent, IterationEvent, Observer, SearchOptions, StageEvent, Start, Termination,
@@ -45,9 +45,7 @@ impl Observer for ErrorCurve {
 // --- Its tests ---
 
 fn observe(budget: usize) -> (ErrorCurve, hybrid_icp::Refinement, hybrid_icp::Refinement) {
-    let mut rng = rng(2);
-    let scene = scene(Household::Iron, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.006, 0.1);
+    let (scene, init) = perturbed_scene(Household::Iron, 0.5, &mut rng(2), (0.006, 0.1));
     let (truth, rows, ended) = (scene.truth, Vec::new(), Vec::new());
     let mut curve = ErrorCurve {
         truth,

@@ -1,7 +1,7 @@
 //! A custom part with a name in pipeline files.
 
-use hicp_sim::{Household, perturb, rng};
-use hicp_tests::scene;
+use hicp_sim::{Household, rng};
+use hicp_tests::perturbed_scene;
 use hybrid_icp::association::{AllSamples, Projective};
 use hybrid_icp::core::Pair;
 use hybrid_icp::icp::Icp;
@@ -50,9 +50,7 @@ fn a_program_can_add_its_own_parts_under_a_name() {
     };
     let message = |metric: &str| build(metric, &catalog).map(|_| ()).unwrap_err().to_string();
 
-    let mut rng = rng(8);
-    let scene = scene(Household::Mug, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.003, 0.05);
+    let (scene, init) = perturbed_scene(Household::Mug, 0.5, &mut rng(8), (0.003, 0.05));
     for (metric, gain) in [
         ("\"gained\"", 1.0),
         ("{ type = \"gained\", gain = 1.5 }", 1.5),

@@ -1,12 +1,12 @@
 //! A custom renderer: a sensor that returns nothing at grazing angles.
 
-use hicp_sim::{Household, RelativeGaussian, perturb, rng};
+use hicp_sim::{Household, RelativeGaussian, rng};
 use hicp_testkit::{RendererLaws, check_renderer};
-use hicp_tests::{Scene, median, scene};
+use hicp_tests::{Scene, median, perturbed_scene};
 use hybrid_icp::Preset;
 use hybrid_icp::core::{
-    DepthImage, Isometry3, NO_TRIANGLE, Observation, PinholeCamera, PixelRegion, Problem,
-    RenderedView, Renderer, TriMesh,
+    DepthImage, Isometry3, NO_TRIANGLE, Observation, PinholeCamera, PixelRegion, RenderedView,
+    Renderer, TriMesh,
 };
 use hybrid_icp::icp::{Session, Stage, Workspace};
 use hybrid_icp::raster::Rasterizer;
@@ -38,20 +38,17 @@ impl Renderer for Grazing {
             .render(mesh, camera, camera_from_object, region, view);
         let drawn = view.region();
         let (depth, triangles) = view.buffers_mut();
-        for v in drawn.v_min..drawn.v_max {
-            for u in drawn.u_min..drawn.u_max {
-                let i = (v - drawn.v_min) as usize * drawn.width() + (u - drawn.u_min) as usize;
-                if triangles[i] == NO_TRIANGLE {
-                    continue;
-                }
-                let Some(normal) = mesh.normal(triangles[i] as usize) else {
-                    continue;
-                };
-                let ray = camera.unproject(u.into(), v.into(), 1.0).coords.normalize();
-                let normal = camera_from_object.rotation * normal.cast::<f64>().into_inner();
-                if normal.dot(&ray).abs() < self.min_cosine {
-                    (depth[i], triangles[i]) = (0.0, NO_TRIANGLE);
-                }
+        for (i, (u, v)) in drawn.pixels().enumerate() {
+            if triangles[i] == NO_TRIANGLE {
+                continue;
+            }
+            let Some(normal) = mesh.normal(triangles[i] as usize) else {
+                continue;
+            };
+            let ray = camera.unproject(u.into(), v.into(), 1.0).coords.normalize();
+            let normal = camera_from_object.rotation * normal.cast::<f64>().into_inner();
+            if normal.dot(&ray).abs() < self.min_cosine {
+                (depth[i], triangles[i]) = (0.0, NO_TRIANGLE);
             }
         }
     }
@@ -70,8 +67,7 @@ fn grazing() -> Grazing {
 /// angles.
 fn sensed(object: Household, seed: u64) -> (Scene, Isometry3<f64>) {
     let mut rng = rng(seed);
-    let mut scene = scene(object, 0.0, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.005, 0.1);
+    let (mut scene, init) = perturbed_scene(object, 0.0, &mut rng, (0.005, 0.1));
     let camera = *scene.observation.camera();
     let mut view = RenderedView::default();
     grazing().render(
@@ -81,10 +77,9 @@ fn sensed(object: Household, seed: u64) -> (Scene, Isometry3<f64>) {
         &camera.region(),
         &mut view,
     );
-    let (width, height) = (camera.width(), camera.height());
-    let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
-    let depth = pixels.map(|(u, v)| view.depth_at(u, v)).collect();
-    let depth = DepthImage::from_meters(width, height, depth).unwrap();
+    let pixels = camera.region().pixels();
+    let depth = pixels.map(|(u, v)| view.depth_at(u, v));
+    let depth = DepthImage::collect(camera.width(), camera.height(), depth).unwrap();
     let depth = RelativeGaussian { percent: 0.5 }.apply(&mut rng, &depth);
     scene.observation = Observation::new(depth, scene.observation.mask().clone(), camera).unwrap();
     (scene, init)
@@ -118,7 +113,7 @@ fn a_pipeline_selects_and_scores_what_the_sensor_returns() {
     let (mut ratios, mut with_grazing) = (Vec::new(), 0);
     for (seed, object) in (0..).zip(Household::ALL) {
         let (scene, init) = sensed(object, seed);
-        let problem = Problem::new(&scene.model, &scene.observation);
+        let problem = scene.problem();
         let shown = |workspace: &mut Workspace| {
             let mut context = workspace.context(&problem);
             let depth = context.view(&scene.truth).unwrap().depth();

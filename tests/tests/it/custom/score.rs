@@ -1,9 +1,9 @@
 //! A custom score: the silhouette against the mask.
 
-use hicp_sim::{Household, perturb, rng};
+use hicp_sim::{Household, rng};
 use hicp_testkit::{ScoreLaws, check_score};
-use hicp_tests::scene;
-use hybrid_icp::core::{Context, Isometry3, Problem};
+use hicp_tests::perturbed_scene;
+use hybrid_icp::core::{Context, Isometry3};
 use hybrid_icp::icp::{Guard, Verdict, Workspace};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::Score;
@@ -26,21 +26,13 @@ impl Score for Silhouette {
         else {
             return 1.0;
         };
-        let (mask, box_of_mask) = (observation.mask(), observation.region());
-        let rows = box_of_mask.v_min..box_of_mask.v_max;
-        let masked = rows
-            .flat_map(|v| (box_of_mask.u_min..box_of_mask.u_max).map(move |u| (u, v)))
-            .filter(|(u, v)| mask.get(*u, *v) == Some(true))
-            .count();
-        let region = view.region();
-        let (mut both, mut union) = (0_u32, masked as u32);
-        for v in region.v_min..region.v_max {
-            for u in region.u_min..region.u_max {
-                if view.depth_at(u, v) > 0.0 {
-                    let inside = mask.get(u, v) == Some(true);
-                    both += u32::from(inside);
-                    union += u32::from(!inside);
-                }
+        let mask = observation.mask();
+        let (mut both, mut union) = (0_u32, mask.n_set() as u32);
+        for (u, v) in view.region().pixels() {
+            if view.depth_at(u, v) > 0.0 {
+                let inside = mask.get(u, v) == Some(true);
+                both += u32::from(inside);
+                union += u32::from(!inside);
             }
         }
         1.0 - f64::from(both) / f64::from(union.max(1))
@@ -68,10 +60,8 @@ fn as_a_guard_it_lets_pass_what_covers_the_mask_better_and_nothing_else() {
     let mut workspace = Workspace::new(Rasterizer::default());
     for (seed, object) in (0..).zip(Household::ALL) {
         for (translation, angle) in [(0.005, 0.1), (0.08, 1.5)] {
-            let mut rng = rng(seed);
-            let scene = scene(object, 0.5, &mut rng);
-            let init = perturb(&mut rng, &scene.truth, translation, angle);
-            let problem = Problem::new(&scene.model, &scene.observation);
+            let (scene, init) = perturbed_scene(object, 0.5, &mut rng(seed), (translation, angle));
+            let problem = scene.problem();
             let mut score = |pose| Silhouette.score(&mut workspace.context(&problem), pose);
             let refine = |stage| {
                 Refiner::boxed(stage)

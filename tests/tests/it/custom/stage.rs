@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use hicp_sim::{Household, perturb, rng};
+use hicp_sim::{Household, rng};
 use hicp_testkit::{StageLaws, check_stage};
-use hicp_tests::scene;
+use hicp_tests::perturbed_scene;
 use hybrid_icp::core::{
     Isometry3, Model, Point3, Problem, Translation3, UnitQuaternion, UnitVector3, Vector3, se3,
 };
@@ -72,9 +72,7 @@ fn it_keeps_the_laws() {
 fn a_car_detected_back_to_front_is_turned_round() {
     let (mut plain_found, mut found, mut kept) = (0, 0, 0);
     for seed in 0..8 {
-        let mut rng = rng(seed);
-        let scene = scene(Household::Car, 0.5, &mut rng);
-        let near = perturb(&mut rng, &scene.truth, 0.004, 0.07);
+        let (scene, near) = perturbed_scene(Household::Car, 0.5, &mut rng(seed), (0.004, 0.07));
         let center = Translation3::from(scene.model.center().coords);
         let back = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), PI);
         let detected = near * center * back * center.inverse();

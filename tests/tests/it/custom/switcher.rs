@@ -1,8 +1,8 @@
 //! A custom switcher: selects by how well the visible normals determine a point-to-plane step.
 
-use hicp_sim::{Household, perturb, rng};
+use hicp_sim::{Household, rng};
 use hicp_testkit::{SwitcherLaws, check_switcher};
-use hicp_tests::{Scene, camera, render, scene};
+use hicp_tests::{Scene, camera, perturbed_scene, render};
 use hybrid_icp::Refiner;
 use hybrid_icp::association::{NearestNeighbor, Projective, SearchIndex, Stride, VisibleSurface};
 use hybrid_icp::core::{
@@ -151,9 +151,7 @@ fn a_face_that_point_to_plane_slides_along_is_held_by_its_outline() {
 
 #[test]
 fn an_object_that_holds_itself_is_registered_by_planes() {
-    let mut rng = rng(3);
-    let scene = scene(Household::Iron, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.005, 0.08);
+    let (scene, init) = perturbed_scene(Household::Iron, 0.5, &mut rng(3), (0.005, 0.08));
     let center = scene.model.center();
     let before = (init * center - scene.truth * center).norm();
     let (distance, regimes) = run(switching(), &scene, &init);

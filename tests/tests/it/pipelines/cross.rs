@@ -34,7 +34,7 @@ use std::path::Path;
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
 use hicp_tests::{Scene, camera, render};
 use hybrid_icp::BoxedStage;
-use hybrid_icp::core::{Isometry3, Model, ModelConfig, Observation, Problem, se3};
+use hybrid_icp::core::{Isometry3, Model, ModelConfig, Observation, se3};
 use hybrid_icp::icp::{Outcome, Session, Verdict, Workspace};
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::pipeline::{Catalog, PartKind};
@@ -202,7 +202,7 @@ fn build(text: &str) -> BoxedStage {
 }
 
 fn run(stage: &mut BoxedStage, workspace: &mut Workspace, case: &Case) -> Outcome {
-    let problem = Problem::new(&case.scene.model, &case.scene.observation);
+    let problem = case.scene.problem();
     stage.run(&problem, &case.init, &mut Session::new(workspace, &mut ()))
 }
 

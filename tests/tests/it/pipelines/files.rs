@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
 use hicp_sim::{Household, perturb, rng};
-use hicp_tests::scene;
+use hicp_tests::{perturbed_scene, scene};
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::pipeline::{Accepts, Catalog, PartKind};
 use hybrid_icp::{Preset, Refiner};
@@ -15,11 +15,7 @@ fn every_shipped_file_gives_the_same_bits_as_its_code() {
     let cases: Vec<_> = [Household::Mug, Household::Hammer]
         .into_iter()
         .flat_map(|object| [(object, 0.005, 0.1), (object, 0.07, 1.0)])
-        .map(|(object, translation, angle)| {
-            let scene = scene(object, 0.5, &mut rng);
-            let init = perturb(&mut rng, &scene.truth, translation, angle);
-            (scene, init)
-        })
+        .map(|(object, meters, angle)| perturbed_scene(object, 0.5, &mut rng, (meters, angle)))
         .collect();
     for preset in Preset::ALL {
         let file = PipelineFile::parse(preset.toml(), preset.name()).unwrap();
@@ -116,9 +112,7 @@ fn pipeline_with(kind: PartKind, part: &str) -> String {
 
 #[test]
 fn every_part_of_the_catalog_builds_and_runs() {
-    let mut rng = rng(4);
-    let scene = scene(Household::Mug, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.003, 0.05);
+    let (scene, init) = perturbed_scene(Household::Mug, 0.5, &mut rng(4), (0.003, 0.05));
     for part in Catalog::built_in().parts() {
         let text = pipeline_with(part.kind, &smallest_use(part.kind, part.name));
         let file = PipelineFile::parse(&text, part.name).unwrap();

@@ -9,9 +9,12 @@ use hybrid_icp::{Preset, Refiner};
 
 const ICP: &str = r#"{ type = "icp", selection = "all-samples", association = "projective", metric = "point-to-plane" }"#;
 
+fn parse(text: &str) -> PipelineFile {
+    PipelineFile::parse(text, "my.toml").unwrap()
+}
+
 fn message(text: &str) -> String {
-    let file = PipelineFile::parse(text, "my.toml").unwrap();
-    file.build().map(|_| ()).unwrap_err().to_string()
+    parse(text).build().map(|_| ()).unwrap_err().to_string()
 }
 
 #[test]
@@ -94,8 +97,7 @@ fn a_count_of_a_billion_is_refused_with_its_field() {
 fn stages_without_an_iteration_limit_count_with_the_default_limit() {
     let endless = ICP.replace(" }", ", stop = [\"convergence\"] }");
     let text = |times: u32| format!("type = \"repeat\"\ntimes = {times}\nstage = {endless}\n");
-    let file = PipelineFile::parse(&text(1000), "my.toml").unwrap();
-    assert!(file.build().is_ok());
+    assert!(parse(&text(1000)).build().is_ok());
     assert!(message(&text(1001)).contains("times: found 1001, up to 1001000 iterations"));
     // A sequence of many stages, none of which exceeds the limit.
     let part = format!("{{ type = \"repeat\", times = 400, stage = {endless} }}");
@@ -103,13 +105,10 @@ fn stages_without_an_iteration_limit_count_with_the_default_limit() {
         let parts = vec![part.as_str(); count].join(",\n");
         format!("type = \"cascade\"\nstages = [{parts}]\n")
     };
-    let built = PipelineFile::parse(&text(2), "my.toml").unwrap().build();
-    assert!(built.is_ok());
+    assert!(parse(&text(2)).build().is_ok());
     let found = message(&text(3));
-    assert!(
-        found.starts_with("my.toml:2: stages: found up to 1200000 iterations in all, "),
-        "{found}"
-    );
+    let expected = "my.toml:2: stages: found up to 1200000 iterations in all, ";
+    assert!(found.starts_with(expected), "{found}");
     // A switch runs only one of its stages.
     for kind in ["switch", "switch-among"] {
         let both = match kind {
@@ -117,12 +116,7 @@ fn stages_without_an_iteration_limit_count_with_the_default_limit() {
             _ => format!("stages = [{part}, {part}, {part}]\n"),
         };
         let text = format!("type = \"repeat\"\ntimes = 2\n[stage]\ntype = \"{kind}\"\n{both}");
-        assert!(
-            PipelineFile::parse(&text, "my.toml")
-                .unwrap()
-                .build()
-                .is_ok()
-        );
+        assert!(parse(&text).build().is_ok());
         let three = text.replace("times = 2\n", "times = 3\n");
         assert!(message(&three).starts_with("my.toml:2: times: found 3, up to 1200000"));
     }
@@ -142,7 +136,7 @@ fn limits_are_exact_when_raised_or_lowered() {
     assert!(file.build_within(&PipelineLimits::NONE).is_ok());
 
     let text = format!("type = \"repeat\"\ntimes = 7\nstage = {ICP}\n");
-    let file = PipelineFile::parse(&text, "my.toml").unwrap();
+    let file = parse(&text);
     let within = |max_iterations| PipelineLimits {
         max_iterations,
         ..defaults
@@ -179,7 +173,7 @@ fn numbers_that_overflow_are_refused_and_do_not_wrap() {
         text = format!("{{ type = \"repeat\", times = 4294967295, stage = {text} }}");
     }
     let text = format!("type = \"guard\"\nstage = {text}\n");
-    let file = PipelineFile::parse(&text, "my.toml").unwrap();
+    let file = parse(&text);
     assert!(file.build().is_err());
     let all_but_one = PipelineLimits {
         max_iterations: u64::MAX - 1,
@@ -226,8 +220,7 @@ fn excessive_sizes_are_refused_wherever_they_are() {
     ] {
         let found = message(&text);
         assert!(found.starts_with(wanted), "{found}");
-        let built = PipelineFile::parse(&text, "my.toml").unwrap();
-        assert!(built.build_within(&PipelineLimits::NONE).is_ok());
+        assert!(parse(&text).build_within(&PipelineLimits::NONE).is_ok());
     }
 }
 
@@ -253,8 +246,7 @@ fn the_largest_counts_are_refused_or_end() {
                 continue;
             }
             let text = use_of(part, parameter.name);
-            let file = PipelineFile::parse(&text, "my.toml").unwrap();
-            match file.build() {
+            match parse(&text).build() {
                 Err(PipelineError::Limit { .. }) => refused.push((part.name, parameter.name)),
                 Err(error) => panic!("{error}: {text}"),
                 Ok(stage) => {

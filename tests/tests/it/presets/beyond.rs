@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use hicp_sim::{Household, perturb, rng};
-use hicp_tests::{Scene, scene};
+use hicp_tests::{Scene, perturbed_scene, scene};
 use hybrid_icp::core::{
     Isometry3, Model, Observation, Point3, Problem, UnitQuaternion, Vector3, se3,
 };
@@ -50,9 +50,7 @@ proptest! {
         meters in 0.0..0.15_f64,
         angle in 0.0..PI,
     ) {
-        let mut rng = rng(seed);
-        let scene = scene(Household::ALL[object], noise, &mut rng);
-        let init = perturb(&mut rng, &scene.truth, meters, angle);
+        let (scene, init) = perturbed_scene(Household::ALL[object], noise, &mut rng(seed), (meters, angle));
         // A bar hides a part of the object in half of the scenes. In a quarter, the mask includes
         // it.
         let observation = match seed % 4 {
@@ -89,9 +87,7 @@ proptest! {
         rotation_degrees in 1.0..180.0_f64,
         rotations in prop_oneof![Just(Rotations::Even), Just(Rotations::ViewAxis), Just(Rotations::Symmetry)],
     ) {
-        let mut rng = rng(seed);
-        let scene = scene(Household::ALL[object], 0.5, &mut rng);
-        let init = perturb(&mut rng, &scene.truth, meters, angle);
+        let (scene, init) = perturbed_scene(Household::ALL[object], 0.5, &mut rng(seed), (meters, angle));
         let options = SearchOptions {
             bound: Some(Bound { translation_meters, rotation_degrees }),
             hypotheses: 64,
@@ -340,7 +336,7 @@ fn a_search_out_of_time_returns_the_local_pose() {
 fn a_search_without_a_possible_gain_is_not_started() {
     let scene = scene(Household::Mug, 0.3, &mut rng(0));
     let init = flipped(&scene, Vector3::z());
-    let problem = Problem::new(&scene.model, &scene.observation);
+    let problem = scene.problem();
     let mut workspace = Workspace::new(Rasterizer::default());
     let mut ranked = |gain: f64| {
         let mut search = presets::search_with(SearchOptions {

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use hicp_sim::{Household, perturb, rng};
-use hicp_tests::scene;
+use hicp_sim::{Household, rng};
+use hicp_tests::perturbed_scene;
 use hybrid_icp::core::{Isometry3, PinholeCamera, PixelRegion, RenderedView, Renderer, TriMesh};
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
@@ -12,9 +12,7 @@ use hybrid_icp::{Preset, Refiner, presets};
 
 #[test]
 fn a_preset_changed_in_rust_equals_its_file_with_the_same_override() {
-    let mut rng = rng(31);
-    let scene = scene(Household::Mug, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.05, 1.5);
+    let (scene, init) = perturbed_scene(Household::Mug, 0.5, &mut rng(31), (0.05, 1.5));
     let mut file = PipelineFile::parse(Preset::Local.toml(), "local").unwrap();
     // Without it, a sure pose would end the preset before the steps.
     file.set("stages.1.switcher.alpha=0").unwrap();
@@ -62,9 +60,7 @@ impl Renderer for Counted {
 
 #[test]
 fn a_refiner_uses_the_given_renderer() {
-    let mut rng = rng(32);
-    let scene = scene(Household::Mug, 0.5, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.005, 0.1);
+    let (scene, init) = perturbed_scene(Household::Mug, 0.5, &mut rng(32), (0.005, 0.1));
     let renders = Arc::new(AtomicUsize::new(0));
     let renderer = Counted(Rasterizer::default(), Arc::clone(&renders));
     let mut refiner = Refiner::with_renderer(presets::hybrid(), renderer);

@@ -86,10 +86,7 @@ fn a_box_on_a_table_shows_the_object_without_the_table() {
             let mask = mask_in_box(&seen.depth, &camera, bbox(region));
             let inside = mask.bounding_region();
             assert_eq!(inside.intersection(&region), inside);
-            let everything =
-                (0..camera.height()).flat_map(|v| (0..camera.width()).map(move |u| (u, v)));
-            let everything = everything.map(|(u, v)| region.contains(u, v)).collect();
-            let everything = Mask::new(camera.width(), camera.height(), everything).expect("valid");
+            let everything = Mask::in_region(camera.width(), camera.height(), &region, |_, _| true);
             of_boxes.push(overlap(&everything, &seen.visible));
             of_masks.push(overlap(&mask, &seen.visible));
         }

@@ -1,7 +1,7 @@
 //! Checks that coarser observations agree with fine ones.
 
-use hicp_sim::{Household, perturb, rng};
-use hicp_tests::{scene, symmetric_pose_distance};
+use hicp_sim::{Household, rng};
+use hicp_tests::{perturbed_scene, scene, symmetric_pose_distance};
 use hybrid_icp::core::Observation;
 use hybrid_icp::icp::{AtResolution, Cascade};
 use hybrid_icp::{Refiner, presets};
@@ -13,20 +13,18 @@ fn a_coarse_pixel_has_the_surfel_of_its_fine_pixel() {
         let fine: &Observation = &scene.observation;
         let coarse = fine.decimated(factor);
         let mut found = 0;
-        for v in 0..coarse.camera().height() {
-            for u in 0..coarse.camera().width() {
-                let (a, b) = (
-                    coarse.surfel_at(u, v),
-                    fine.surfel_at(u * factor, v * factor),
-                );
-                assert_eq!(a, b, "factor {factor}, pixel ({u}, {v})");
-                let Some(surfel) = a else { continue };
-                found += 1;
-                // The coarse camera projects the point onto the center of its pixel.
-                let pixel = coarse.camera().project(&surfel.point.cast()).unwrap();
-                assert!((pixel.x - f64::from(u)).abs() < 1e-3, "factor {factor}");
-                assert!((pixel.y - f64::from(v)).abs() < 1e-3, "factor {factor}");
-            }
+        for (u, v) in coarse.camera().region().pixels() {
+            let (a, b) = (
+                coarse.surfel_at(u, v),
+                fine.surfel_at(u * factor, v * factor),
+            );
+            assert_eq!(a, b, "factor {factor}, pixel ({u}, {v})");
+            let Some(surfel) = a else { continue };
+            found += 1;
+            // The coarse camera projects the point onto the center of its pixel.
+            let pixel = coarse.camera().project(&surfel.point.cast()).unwrap();
+            assert!((pixel.x - f64::from(u)).abs() < 1e-3, "factor {factor}");
+            assert!((pixel.y - f64::from(v)).abs() < 1e-3, "factor {factor}");
         }
         assert_eq!(found, coarse.n_surfels());
         assert!(found > 100);
@@ -38,9 +36,7 @@ fn a_coarse_pixel_has_the_surfel_of_its_fine_pixel() {
 
 #[test]
 fn coarse_to_fine_ends_at_the_same_pose_as_fine() {
-    let mut rng = rng(8);
-    let scene = scene(Household::Iron, 0.0, &mut rng);
-    let init = perturb(&mut rng, &scene.truth, 0.003, 0.05);
+    let (scene, init) = perturbed_scene(Household::Iron, 0.0, &mut rng(8), (0.003, 0.05));
     let fine = presets::projective_cascade_point_plane();
     let pyramid = Cascade((
         AtResolution {
