@@ -30,8 +30,7 @@ fn without_segmentation_rows_are_refined_in_the_box_around_their_pose() {
         std::fs::remove_dir_all(world.scene(scene).join("mask_visib")).unwrap();
         world.remove(world.scene(scene).join("scene_gt.json"));
     }
-    let (run, _) = world.refine(&rows, "--mask none --no-time --threads 2");
-    run.exits(0);
+    world.refined(&rows, "--mask none --no-time --threads 2");
     assert_eq!(world.bytes("out.csv"), whole);
     world
         .run("--mask none --detections found.json")
@@ -57,14 +56,12 @@ fn rows_of_one_object_compete_for_its_masks() {
         ResultRow::new(3, 0, CAR, moved)
     });
     let astray = astray.into_iter().find(|row| {
-        let (run, alone) = world.refine(std::slice::from_ref(row), "--no-time");
-        run.exits(0);
+        let alone = world.refined(std::slice::from_ref(row), "--no-time");
         nearest(&alone[0]) == 0
     });
     let astray = astray.unwrap();
     for rows in [[good.clone(), astray.clone()], [astray, good]] {
-        let (run, refined) = world.refine(&rows, "--no-time");
-        run.exits(0);
+        let refined = world.refined(&rows, "--no-time");
         // Each estimate has its own mask.
         let mut found: Vec<usize> = refined.iter().map(nearest).collect();
         found.sort_unstable();
@@ -149,8 +146,7 @@ fn set_cameras(world: &World, camera: &Value) {
 fn layouts_of_other_datasets_give_the_same_bytes() {
     let world = World::new();
     let rows = world.rows();
-    let (run, _) = world.refine(&rows, "--no-time");
-    run.exits(0);
+    world.refined(&rows, "--no-time");
     let output = || world.bytes("out.csv");
     let expected = output();
 
@@ -162,8 +158,7 @@ fn layouts_of_other_datasets_give_the_same_bytes() {
     };
     let pinhole = [400.0, 402.0, 161.5, 118.0];
     set_cameras(&world, &model("PinholePlane", &pinhole));
-    let (run, _) = world.refine(&rows, "--no-time");
-    run.exits(0);
+    world.refined(&rows, "--no-time");
     assert_eq!(output(), expected);
     let mut large = model("PinholePlane", &pinhole);
     large["cam_model"]["image_width"] = json!(1408);
@@ -213,8 +208,7 @@ fn layouts_of_other_datasets_give_the_same_bytes() {
 fn a_sensor_of_several_gives_the_same_bytes() {
     let world = World::new();
     let rows = world.rows();
-    let (run, _) = world.refine(&rows, "--no-time");
-    run.exits(0);
+    world.refined(&rows, "--no-time");
     let whole = world.bytes("out.csv");
     for scene in [3, 12] {
         for name in world.names(world.scene(scene)) {

@@ -29,8 +29,7 @@ fn other_hypotheses_follow_the_rows() {
     let world = World::new();
     let rows = world.rows();
     let search = "--pipeline search --no-time --set threshold=0";
-    let (run, refined) = world.refine(&rows, search);
-    run.exits(0);
+    let refined = world.refined(&rows, search);
     let run = world.run(&format!("{search} --hypotheses 3")).exits(0);
     run.prints(&["10 rows of 4 frames"]);
     let all = read_results(world.path("out.csv")).unwrap();
@@ -58,8 +57,7 @@ fn threads_do_not_change_a_byte() {
     let rows = world.rows();
     let mut outputs = Vec::new();
     for threads in [1, 2, 7] {
-        let (run, refined) = world.refine(&rows, &format!("--no-time --threads {threads}"));
-        run.exits(0);
+        let refined = world.refined(&rows, &format!("--no-time --threads {threads}"));
         assert!(refined.iter().all(|row| row.time_s.is_none()));
         outputs.push(world.bytes("out.csv"));
     }
@@ -81,8 +79,7 @@ fn the_time_is_the_same_on_all_rows_of_an_image() {
             _ => None,
         };
     }
-    let (run, refined) = world.refine(&rows, "");
-    run.exits(0);
+    let refined = world.refined(&rows, "");
     let mut times: BTreeMap<(u32, u32), f64> = BTreeMap::new();
     for row in &refined {
         let time = row.time_s.unwrap();
@@ -285,15 +282,13 @@ fn damaged_files_are_reported_and_the_rest_is_written() {
 fn masks_of_a_detections_file_are_the_same_masks() {
     let world = World::new();
     let rows = world.rows();
-    let (run, reference) = world.refine(&rows, "--no-time");
-    run.exits(0);
+    let reference = world.refined(&rows, "--no-time");
     for compressed in [true, false] {
         let mut detections = world.detections(|_| compressed);
         // A detection without a segmentation and a box is ignored.
         detections.push(json!({"scene_id": 3, "image_id": 0, "category_id": 1, "score": 1}));
         world.write("found.json", Value::from(detections).to_string());
-        let (run, refined) = world.refine(&rows, "--no-time --detections found.json");
-        run.exits(0);
+        let refined = world.refined(&rows, "--no-time --detections found.json");
         assert_eq!(refined, reference);
 
         // Detections work without ground truth.
@@ -304,8 +299,7 @@ fn masks_of_a_detections_file_are_the_same_masks() {
                 std::fs::rename(file, aside).unwrap();
             }
         }
-        let (run, refined) = world.refine(&rows, "--no-time --detections found.json");
-        run.exits(0);
+        let refined = world.refined(&rows, "--no-time --detections found.json");
         assert_eq!(refined, reference);
         let (run, _) = world.refine(&rows, "");
         assert!(run.exits(0).out.contains("10  kept: no mask of the object"));

@@ -28,8 +28,7 @@ fn killed(world: &World) -> Vec<u8> {
 fn a_killed_run_continues_to_the_same_bytes() {
     let world = World::new();
     let rows = grouped_for_signals(&world);
-    let (whole, _) = world.refine(&rows, "--no-time");
-    whole.exits(0);
+    world.refined(&rows, "--no-time");
     let expected = world.bytes(OUTPUT);
     assert!(!world.path(JOURNAL).exists());
     world.write("out.csv", "the user's");
@@ -92,8 +91,7 @@ fn a_killed_run_continues_to_the_same_bytes() {
 #[test]
 fn images_of_damaged_journal_lines_are_refined_again() {
     let world = World::new();
-    let (whole, _) = world.refine(&grouped_for_signals(&world), "--no-time");
-    whole.exits(0);
+    world.refined(&grouped_for_signals(&world), "--no-time");
     let expected = world.bytes(OUTPUT);
     let held = killed(&world);
     let begin = held.iter().position(|byte| *byte == b'\n').unwrap() + 1;
@@ -115,8 +113,7 @@ fn images_of_damaged_journal_lines_are_refined_again() {
 #[test]
 fn a_run_continues_only_with_the_files_that_it_started_with() {
     let world = World::new();
-    let (whole, _) = world.refine(&grouped_for_signals(&world), "--no-time");
-    whole.exits(0);
+    world.refined(&grouped_for_signals(&world), "--no-time");
     let expected = world.bytes(OUTPUT);
     let held = killed(&world);
     let refused = |name: &str, parts: [&str; 2]| {
@@ -264,8 +261,7 @@ fn the_outputs_of_all_shards_equal_the_output_of_one_run() {
 
     // If rows are scattered, the lines have another order, and a warning reports it.
     let rows = world.rows();
-    let (run, _) = world.refine(&rows, "--no-time");
-    run.exits(0);
+    world.refined(&rows, "--no-time");
     let sorted = |texts: &[Vec<u8>]| {
         let texts = texts.iter().map(|text| String::from_utf8_lossy(text));
         let lines = texts.flat_map(|text| {

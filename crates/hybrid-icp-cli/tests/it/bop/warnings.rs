@@ -163,8 +163,7 @@ fn results_on_a_wall_are_warned_of() {
     let wall = vec![0.5; (width * height) as usize];
     let wall = DepthImage::from_meters(width, height, wall).unwrap();
     hicp_io::write_depth_png(world.depth_path(3, 40), &wall, 0.1).unwrap();
-    let (run, _) = world.refine(&world.rows(), "--rows rows.csv");
-    run.exits(0);
+    world.refined(&world.rows(), "--rows rows.csv");
     let mut warned = 0;
     for line in lines_of(&world) {
         let on_wall = line[0] == "3" && line[1] == "40";

@@ -190,11 +190,19 @@ impl World {
         (run, refined)
     }
 
+    /// Refines rows without a fault; returns the output's rows.
+    #[track_caller]
+    pub(crate) fn refined(&self, rows: &[ResultRow], options: &str) -> Vec<ResultRow> {
+        let (run, refined) = self.refine(rows, options);
+        run.exits(0);
+        refined
+    }
+
     /// Refines the rows of `in.csv`.
     #[track_caller]
     pub(crate) fn run(&self, options: &str) -> Run {
         let fixed = "bop refine --dataset . --split test --results in.csv --output out.csv";
-        self.command(&format!("{fixed} {options}"))
+        self.command(format!("{fixed} {options}"))
     }
 
     /// Asserts that a row is near the true pose of its object that was nearest before refinement.

@@ -234,7 +234,7 @@ fn a_full_disk_leaves_existing_files() {
     let scene = Scene::new();
     scene.create_dir("disk");
     for name in ["out.json", "trace.jsonl", "overlay.png"] {
-        scene.write(&format!("disk/{name}"), "the user's");
+        scene.write(format!("disk/{name}"), "the user's");
     }
     let limit = "ulimit -f 1";
     if let Some(run) = in_shell(scene.root(), false, limit, REFINE) {

@@ -57,7 +57,7 @@ fn a_color_image_is_used_with_a_colored_mesh_and_a_trace_repeats_it() {
     assert_eq!(result["warnings"], serde_json::json!([]));
     let trace = scene.read("trace.jsonl");
     let header = trace.lines().next().unwrap();
-    assert_contains(&header, &[r#""rgb":"rgb.png""#]);
+    assert_contains(header, &[r#""rgb":"rgb.png""#]);
     scene.command("replay trace.jsonl").exits(0);
 }
 

@@ -94,7 +94,7 @@ fn assert_kept(scene: &Scene, reason: &str) {
     let result = scene.result();
     assert_eq!(result["outcome"], "kept_initial", "{result}");
     let text = result["reason"].as_str().unwrap();
-    assert_contains(&text, &[reason]);
+    assert_contains(text, &[reason]);
     let init = scene.read("init.json");
     let init: Value = serde_json::from_str(&init).unwrap();
     for key in ["cam_R_m2c", "cam_t_m2c"] {
