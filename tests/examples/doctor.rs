@@ -42,7 +42,7 @@ struct Inputs {
 type Injected = (&'static str, &'static str, fn(Inputs) -> Inputs);
 
 #[rustfmt::skip]
-const FAULTS: [Injected; 43] = [
+const FAULTS: [Injected; 45] = [
     ("mesh: mm read as m", "the mesh is 1000 times too large", |i| i.mesh(1e3, false)),
     ("mesh: m read as mm", "the mesh is 1000 times too small", |i| i.mesh(1e-3, false)),
     ("mesh: cm read as m", "the mesh is 100 times too large", |i| i.mesh(1e2, false)),
@@ -80,6 +80,10 @@ const FAULTS: [Injected; 43] = [
     ("camera: half the resolution", INTRINSICS, |i| i.camera(0.5, 0.5, 0.0)),
     ("camera: 1280×720, stretched", INTRINSICS, |i| i.camera(2.0, 1.5, 0.0)),
     ("camera: 1280×720, cropped", INTRINSICS, |i| i.camera(1.5, 1.5, 160.0)),
+    ("camera: fx, fy and cx, cy exchanged", INTRINSICS, |i| {
+        i.intrinsics(|[fx, fy, cx, cy]| [cx, cy, fx, fy])
+    }),
+    ("camera: cx and cy swapped", INTRINSICS, |i| i.intrinsics(|[fx, fy, cx, cy]| [fx, fy, cy, cx])),
     ("pose: transposed", "the rotation of the pose is transposed", |i| {
         i.poses(|pose| Isometry3::from_parts(pose.translation, pose.rotation.inverse()))
     }),
@@ -206,9 +210,14 @@ impl Inputs {
     }
 
     /// Scales the intrinsics and moves the principal point to the right.
-    fn camera(mut self, x: f64, y: f64, right: f64) -> Self {
+    fn camera(self, x: f64, y: f64, right: f64) -> Self {
+        self.intrinsics(|[fx, fy, cx, cy]| [fx * x, fy * y, cx * x + right, cy * y])
+    }
+
+    /// Replaces fx, fy, cx and cy.
+    fn intrinsics(mut self, new: impl Fn([f64; 4]) -> [f64; 4]) -> Self {
         let c = self.camera;
-        let (fx, fy, cx, cy) = (c.fx() * x, c.fy() * y, c.cx() * x + right, c.cy() * y);
+        let [fx, fy, cx, cy] = new([c.fx(), c.fy(), c.cx(), c.cy()]);
         let camera = PinholeCamera::new(fx, fy, cx, cy, c.width(), c.height());
         self.camera = camera.expect("a camera");
         self

@@ -124,6 +124,8 @@ def test_masks_that_do_not_fit_the_object_cause_a_warning(scene):
     swapped = hi.Camera(300, 305, 121, 159.5, 320, 240)
     swapped = hi.Observation(scene.depth, scene.mask, swapped)
     warns("if cx and cy were swapped", scene.model, swapped)
+    with pytest.warns(hi.InputWarning, match=r"bbox \(200, .* not two corners"):
+        hi.mask_in_box(scene.depth, scene.camera, (200, 100, 260, 180))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         hi.Pipeline("local").estimate(scene.model, scene.observation)
@@ -136,6 +138,10 @@ def test_masks_that_do_not_fit_the_object_cause_a_warning(scene):
         (lambda: hi.Model(np.eye(3), np.zeros((1, 3))), "faces is an array of float64 .* expected an .F, 3. array of integers"),
         (lambda: hi.Model(np.eye(3), [[0.9, 1.2, 2.7]]), "faces is an array of float64 .* expected an .F, 3. array of integers"),
         (lambda: hi.Model(np.eye(3), [[0, 1, 2]], samples=10**12), "samples is 1000000000000, expected at most 10000000"),
+        (
+            lambda: hi.Model(np.eye(3), [[0, 1, 2]], symmetry_axes=[[0, 0, 1]]),
+            r"symmetry_axes is a list, expected pairs of a direction and a point",
+        ),
         (
             lambda: hi.Model(np.eye(3), [[0, 1, 2]], symmetry_axes=[([0, 0, 1], [0, 0, 0])] * 4000),
             "define 1260000 motions, expected at most 1000000",

@@ -8,7 +8,7 @@ use hicp_icp::Alternative;
 use hicp_score::Flatness;
 use hicp_switch::PAPER_ALPHA;
 
-use crate::warning::Warning;
+use crate::warning::{CenterFault, Warning};
 
 /// Diameters that a depth camera can see. A coin in meters or a car in millimeters is outside.
 const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
@@ -47,6 +47,16 @@ pub const ACCEPTED: f64 = 0.95;
 /// Share of the mesh's diameter by which a stated one may differ. BOP states the diameters of other
 /// versions of the mesh, with more vertices.
 const DIAMETER_TOLERANCE: f64 = 0.05;
+
+/// Sizes of images, relative to this one, to which its intrinsics may belong.
+const SIZES: [f64; 8] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.5, 2.0, 3.0, 4.0];
+/// Largest distance of a principal point from the middle of that image, in halves of the width.
+const CENTERED: f64 = 0.06;
+/// Largest logarithm of the ratio of the sides of a pixel.
+const SQUARE: f64 = 0.1;
+/// Largest angle between the optical axis and a pixel. The corners of the widest depth cameras are
+/// at 68°.
+const FARTHEST_DEGREES: f64 = 70.0;
 
 /// Returns warnings about the inputs of a refinement; `init` is camera from object, meters.
 ///
@@ -288,18 +298,55 @@ fn smallest_side(model: &Model) -> f64 {
     sides[0] * sides[1]
 }
 
-/// Returns [`Warning::Center`] if the coordinates of the principal point seem to be swapped.
+/// Returns [`Warning::Center`] if the intrinsics are hardly those of the image.
+///
+/// The principal point of a cropped image may be anywhere, also outside.
 fn warning_of_center(camera: &PinholeCamera) -> Option<Warning> {
-    let (cx, cy) = (camera.cx(), camera.cy());
-    let (u, v) = (
-        0.5 * f64::from(camera.width()),
-        0.5 * f64::from(camera.height()),
-    );
-    let (off, swapped) = (
-        (cx - u).abs() + (cy - v).abs(),
-        (cy - u).abs() + (cx - v).abs(),
-    );
-    (off > 0.2 * u && swapped < 0.25 * off).then_some(Warning::Center { cx, cy })
+    let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
+    let (u, v) = (0.5 * width, 0.5 * height);
+    let [fx, fy, cx, cy] = [camera.fx(), camera.fy(), camera.cx(), camera.cy()];
+    let off = |x: f64, y: f64| (x - u).abs() + (y - v).abs();
+    let resized = |factor: &f64| off(cx / factor, cy / factor) < CENTERED * u;
+    // Pixels are about square, but the halves of an image's sides are not.
+    let square = |x: f64, y: f64| (x / y).ln().abs() < SQUARE;
+    let exchanged = off(fx, fy) < 0.2 * u && square(cx, cy);
+    let corner = (cx.max(width - cx) / fx).hypot(cy.max(height - cy) / fy);
+    let degrees = corner.atan().to_degrees();
+    let fault = if off(cx, cy) <= 0.2 * u {
+        (degrees > FARTHEST_DEGREES).then_some(CenterFault::Far { degrees })
+    } else if off(cy, cx) < 0.25 * off(cx, cy) {
+        Some(CenterFault::Swapped)
+    } else if exchanged && (!square(fx, fy) || cx > width || cy > height) {
+        Some(CenterFault::Exchanged)
+    } else if let Some(factor) = SIZES.into_iter().find(resized) {
+        Some(CenterFault::Resized { factor })
+    } else {
+        (degrees > FARTHEST_DEGREES).then_some(CenterFault::Far { degrees })
+    };
+    fault.map(|fault| Warning::Center { cx, cy, fault })
+}
+
+/// Returns [`Warning::Box`] if a box ends outside of an image, as one of two corners often does.
+///
+/// The box is x and y of its corner, width and height, as for [`mask_in_box`](crate::mask_in_box);
+/// the size of the image is width and height, in pixels. A tenth of the box may be outside.
+///
+/// ```
+/// use hybrid_icp::{Warning, warning_of_box};
+/// assert_eq!(warning_of_box([300.0, 200.0, 90.0, 80.0], (640, 480)), None);
+/// let corners = warning_of_box([300.0, 200.0, 390.0, 280.0], (640, 480));
+/// assert!(matches!(corners, Some(Warning::Box { .. })));
+/// ```
+#[must_use]
+pub fn warning_of_box([x, y, w, h]: [f64; 4], (width, height): (u32, u32)) -> Option<Warning> {
+    let (right, bottom) = (x + w, y + h);
+    let is_outside = right > f64::from(width) + 0.1 * w || bottom > f64::from(height) + 0.1 * h;
+    is_outside.then_some(Warning::Box {
+        right,
+        bottom,
+        width,
+        height,
+    })
 }
 
 /// Returns whether the mask may continue beyond the image.

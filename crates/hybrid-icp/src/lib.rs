@@ -105,8 +105,8 @@ pub use align::{
 pub use batch::refine_batch;
 pub use calibration::Calibration;
 pub use checks::{
-    ACCEPTED, EXPLAINS_NOTHING, warning_of_diameter, warning_of_distance, warning_of_runner_up,
-    warnings, warnings_of_image, warnings_of_model, warnings_of_result,
+    ACCEPTED, EXPLAINS_NOTHING, warning_of_box, warning_of_diameter, warning_of_distance,
+    warning_of_runner_up, warnings, warnings_of_image, warnings_of_model, warnings_of_result,
 };
 pub use diagnosis::{Diagnosis, Fault, Finding};
 pub use hicp_icp::BoxedStage;
@@ -117,7 +117,7 @@ pub use sequential::SequentialEstimator;
 pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs};
 pub use trace::{StageRecord, Trace};
 pub use tracker::{TrackState, Tracked, Tracker, TrackerConfig};
-pub use warning::Warning;
+pub use warning::{CenterFault, Warning};
 
 /// The names that most programs and most custom components need: `use hybrid_icp::prelude::*;`.
 ///

@@ -40,16 +40,29 @@ pub enum Warning {
         /// Diameter of the model.
         diameter: f64,
     },
-    /// The principal point is far from the middle of the image, but would be near it if its two
-    /// coordinates were swapped.
-    #[error(
-        "the principal point ({cx}, {cy}) would be near the middle of the image if cx and cy were swapped"
-    )]
+    /// The intrinsics are hardly those of the image.
+    #[error("the principal point ({cx}, {cy}) {fault}")]
     Center {
         /// Column of the principal point, pixels.
         cx: f64,
         /// Row of the principal point, pixels.
         cy: f64,
+        /// The fault.
+        fault: CenterFault,
+    },
+    /// A box ends outside of the image ([`warning_of_box`](crate::warning_of_box)).
+    #[error(
+        "the box ends at ({right}, {bottom}), outside of the {width}x{height} image: check that it is x, y, width, height, and not two corners"
+    )]
+    Box {
+        /// Column at which the box ends, pixels.
+        right: f64,
+        /// Row at which it ends, pixels.
+        bottom: f64,
+        /// Width of the image, pixels.
+        width: u32,
+        /// Height of the image, pixels.
+        height: u32,
     },
     /// The object is behind the camera at the initial pose. The pose may also be invalid: not
     /// finite, or with a quaternion that is not of length 1.
@@ -177,13 +190,46 @@ pub enum Warning {
     },
 }
 
+/// The probable fault of intrinsics whose principal point is far from the middle of the image.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum CenterFault {
+    /// Its two coordinates are swapped, or the image was rotated by 90°.
+    #[error(
+        "would be near the middle of the image if cx and cy were swapped: they may be, or the image was rotated by 90°"
+    )]
+    Swapped,
+    /// The focal lengths and the principal point are exchanged.
+    #[error("would be near the middle of the image if cx, cy and fx, fy were exchanged")]
+    Exchanged,
+    /// The intrinsics are those of an image of another size.
+    ///
+    /// An image that was cropped to its left upper part looks the same.
+    #[error(
+        "is the middle of an image {factor:.2} times as large: if the image was resized, resize fx, fy, cx and cy with it"
+    )]
+    Resized {
+        /// Size of that image relative to this one.
+        factor: f64,
+    },
+    /// No camera without lens distortion sees so far from its optical axis.
+    #[error(
+        "puts a corner of the image {degrees:.0}° off the optical axis: expected fx, fy, cx and cy in pixels of this image"
+    )]
+    Far {
+        /// Angle between the optical axis and the farthest corner, degrees.
+        degrees: f64,
+    },
+}
+
 /// Returns a gap in score, rounded up to hundredths and at least 0.01.
 fn within(gap: f64) -> f64 {
     (gap.abs() * 100.0).ceil().max(1.0) / 100.0
 }
 
 /// A length in messages: with four digits, or in scientific notation if it is tiny or huge.
-struct Meters(f64);
+pub(crate) struct Meters(pub(crate) f64);
 
 impl std::fmt::Display for Meters {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -7,7 +7,7 @@ use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera, TriMesh,
 };
 use hybrid_icp::icp::Verdict;
-use hybrid_icp::{ACCEPTED, Preset, Refiner, Warning, warnings, warnings_of_model};
+use hybrid_icp::{ACCEPTED, CenterFault, Preset, Refiner, Warning, warnings, warnings_of_model};
 
 use crate::numbers::{camera, cuboid};
 
@@ -62,25 +62,42 @@ fn a_pose_is_judged_without_a_refinement() {
 }
 
 #[test]
-fn a_swapped_principal_point_causes_a_warning() {
+fn intrinsics_of_another_image_cause_a_warning() {
     let model = Model::new(cuboid([0.1, 0.06, 0.04]));
-    let swapped = |cx: f64, cy: f64| {
-        let camera = PinholeCamera::new(300.0, 300.0, cx, cy, 160, 120).unwrap();
+    let found = |[fx, fy, cx, cy]: [f64; 4]| {
+        let camera = PinholeCamera::new(fx, fy, cx, cy, 160, 120).unwrap();
         let depth = DepthImage::from_meters(160, 120, vec![0.5; 160 * 120]).unwrap();
         let observation = Observation::new(depth, Mask::full(160, 120), camera).unwrap();
         let warnings = warnings(&model, &observation, &Isometry3::translation(0.0, 0.0, 0.5));
-        warnings.contains(&Warning::Center { cx, cy })
+        warnings.iter().find_map(|warning| match warning {
+            Warning::Center { fault, .. } => Some(*fault),
+            _ => None,
+        })
     };
-    assert!(swapped(58.0, 83.0));
+    let resized = |factor| Some(CenterFault::Resized { factor });
+    assert_eq!(
+        found([300.0, 300.0, 58.0, 83.0]),
+        Some(CenterFault::Swapped)
+    );
+    assert_eq!(
+        found([81.0, 59.0, 300.0, 301.0]),
+        Some(CenterFault::Exchanged)
+    );
+    assert_eq!(found([600.0, 600.0, 161.0, 118.0]), resized(2.0));
+    assert_eq!(found([150.0, 150.0, 39.0, 30.5]), resized(0.5));
+    let far = |intrinsics| matches!(found(intrinsics), Some(CenterFault::Far { .. }));
+    assert!(far([300.0, 300.0, 3000.0, 60.0]));
+    assert!(far([4.2, 4.2, 80.0, 60.0]));
     // A crop can have its principal point anywhere.
     for (cx, cy) in [
         (83.0, 58.0),
         (79.5, 59.5),
         (70.0, 70.0),
         (20.0, 30.0),
+        (150.0, 50.0),
         (-100.0, 300.0),
     ] {
-        assert!(!swapped(cx, cy), "{cx} {cy}");
+        assert_eq!(found([300.0, 300.0, cx, cy]), None, "{cx} {cy}");
     }
 }
 

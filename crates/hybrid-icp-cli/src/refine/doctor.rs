@@ -20,8 +20,8 @@ use crate::terminal::{check_stdout, say, warn};
 /// Each fault that inputs can have is corrected on trial, and a short refinement scores the
 /// corrected inputs: 0 is perfect, 1 the worst. A fault is named if its correction improves the
 /// score clearly. The most probable fault comes first. The faults: wrong units and scales (with the
-/// factor), ray distances, inverted depth, disparities, intrinsics of another resolution, a
-/// transposed or inverted pose, OpenGL axes, a quaternion of another order, a model with another
+/// factor), ray distances, inverted depth, disparities, intrinsics of another resolution or order,
+/// a transposed or inverted pose, OpenGL axes, a quaternion of another order, a model with another
 /// origin, mirrored images, depth and mask that are not aligned, an inside-out mesh, and masks that
 /// are inverted, empty, soft, label images, too large, or on a plane.
 ///

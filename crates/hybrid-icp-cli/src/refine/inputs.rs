@@ -7,7 +7,7 @@ use clap::error::ErrorKind;
 use clap::{ArgGroup, Args};
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
 use hybrid_icp::core::{ColorImage, DepthImage, Mask, Model, Observation, PinholeCamera};
-use hybrid_icp::mask_in_box;
+use hybrid_icp::{mask_in_box, warning_of_box};
 
 use super::colors;
 use crate::limits::limits;
@@ -293,12 +293,9 @@ impl Inputs {
                         files.depth.display()
                     );
                 }
-                let (right, low) = (x + width, y + height);
-                if right > w + 0.1 * width || low > h + 0.1 * height {
-                    warnings.push(format!(
-                        "--bbox {x},{y},{width},{height}: the box ends at {right},{low}, outside of the {w}x{h} image: check that it is x,y,width,height, and not two corners"
-                    ));
-                }
+                let warning = warning_of_box(*bbox, depth_size);
+                warnings
+                    .extend(warning.map(|text| format!("--bbox {x},{y},{width},{height}: {text}")));
                 (None, *bbox)
             }
         };

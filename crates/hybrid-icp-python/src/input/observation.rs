@@ -98,6 +98,9 @@ pub(crate) fn mask_in_box(
         let found = format!("bbox is ({x}, {y}, {w}, {h}) in a {right}x{low} image");
         return Err(InputError::new_err(format!("{found}, expected {expected}")));
     }
+    if let Some(warning) = hybrid_icp::warning_of_box([x, y, w, h], camera.size()) {
+        errors::warn(py, &format!("bbox ({x}, {y}, {w}, {h}): {warning}"))?;
+    }
     let mask = py.detach(|| hybrid_icp::mask_in_box(&image, &camera, [x, y, w, h]));
     Ok(depth::image(mask.width(), mask.pixels()))
 }

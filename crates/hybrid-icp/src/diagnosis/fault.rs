@@ -47,7 +47,7 @@ pub enum Fault {
         /// The vector to add to the model's vertices: x, y and z in the object frame, meters.
         shift_meters: [f64; 3],
     },
-    /// The camera's intrinsics belong to images of another resolution.
+    /// The camera's intrinsics belong to images of another resolution, or are in another order.
     ///
     /// The numbers are those of this image, pixels.
     Intrinsics {
@@ -168,7 +168,9 @@ impl Fault {
             }
             Self::Intrinsics { fx, fy, cx, cy } => {
                 let [fx, fy, cx, cy] = [fx, fy, cx, cy].map(Number);
-                let fault = "the intrinsics belong to images of another resolution".to_owned();
+                let fault =
+                    "the intrinsics belong to images of another resolution, or are in another order"
+                        .to_owned();
                 (fault, format!("use fx {fx}, fy {fy}, cx {cx}, cy {cy}"))
             }
             Self::RayDistance => texts(

@@ -81,27 +81,36 @@ pub(super) fn translation_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'
 
 /// The principal point is near the middle of the image that the intrinsics belong to.
 ///
-/// The images of another resolution are scaled by axis, or cropped on two sides.
+/// The images of another resolution are scaled by axis, or cropped on two sides. The numbers of
+/// this image may be in another order.
 pub(super) fn intrinsics<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
     let old = inputs.camera;
     let (width, height) = (f64::from(old.width()), f64::from(old.height()));
+    let [fx, fy, cx, cy] = [old.fx(), old.fy(), old.cx(), old.cy()];
+    let centered = |cx: f64, cy: f64, [w, h]: [f64; 2]| {
+        let off = |center: f64, side: f64| (2.0 * center / side - 1.0).abs();
+        off(cx, w).max(off(cy, h)) < 0.12
+    };
     let same_shape = FACTORS.map(|factor| [width / factor, height / factor]);
     let sizes = SIZES.into_iter().filter(|[w, h]| w * height != h * width);
-    let centered = |[w, h]: &[f64; 2]| {
-        let off = |center: f64, side: f64| (2.0 * center / side - 1.0).abs();
-        off(old.cx(), *w).max(off(old.cy(), *h)) < 0.12
-    };
-    let sizes = same_shape.into_iter().chain(sizes).filter(centered);
+    let sizes = same_shape.into_iter().chain(sizes);
+    let sizes = sizes.filter(|size| centered(cx, cy, *size));
     let corrected = sizes.flat_map(|[w, h]| {
         let (x, y) = (width / w, height / h);
-        let scaled = [old.fx() * x, old.fy() * y, old.cx() * x, old.cy() * y];
+        let scaled = [fx * x, fy * y, cx * x, cy * y];
         let s = x.max(y);
-        let (cx, cy) = (old.cx() - w / 2.0, old.cy() - h / 2.0);
-        let (cx, cy) = (cx * s + width / 2.0, cy * s + height / 2.0);
-        let cropped = (x != y).then_some([old.fx() * s, old.fy() * s, cx, cy]);
-        std::iter::once(scaled).chain(cropped)
+        let (right, down) = (cx - w / 2.0, cy - h / 2.0);
+        let cropped = [
+            fx * s,
+            fy * s,
+            right * s + width / 2.0,
+            down * s + height / 2.0,
+        ];
+        std::iter::once(scaled).chain((x != y).then_some(cropped))
     });
-    let found = corrected.filter_map(|[fx, fy, cx, cy]| {
+    let orders = [[fx, fy, cy, cx], [cx, cy, fx, fy]].into_iter();
+    let orders = orders.filter(|[_, _, cx, cy]| centered(*cx, *cy, [width, height]));
+    let found = corrected.chain(orders).filter_map(|[fx, fy, cx, cy]| {
         let camera = PinholeCamera::new(fx, fy, cx, cy, old.width(), old.height()).ok()?;
         let inputs = Inputs {
             camera,
