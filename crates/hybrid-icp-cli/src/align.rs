@@ -7,7 +7,7 @@ use clap::builder::RangedU64ValueParser;
 use hicp_io::{LengthUnit, PointCloud};
 use hybrid_icp::core::{Isometry3, Matrix6};
 use hybrid_icp::icp::Verdict;
-use hybrid_icp::{CloudOptions, Registration, align};
+use hybrid_icp::{CloudOptions, CloudWarning, Registration, align};
 use serde_json::json;
 
 use crate::limits::limits;
@@ -37,6 +37,9 @@ pub(crate) struct Arguments {
     /// Unit of the coordinates of both clouds: m, mm or cm.
     #[arg(long, value_name = "UNIT", default_value_t = LengthUnit::Meters)]
     unit: LengthUnit,
+    /// Unit of the coordinates of the target, if it is another one.
+    #[arg(long, value_name = "UNIT")]
+    target_unit: Option<LengthUnit>,
     /// The rough pose, source to target, in the forms of `refine`. If not given, the clouds are
     /// taken as they are.
     #[arg(long, value_name = "FILE")]
@@ -83,12 +86,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         voxel_meters: meters(arguments.voxel),
         neighbors: arguments.neighbors,
     };
-    let read = |path, options: CloudOptions| -> anyhow::Result<_> {
-        let PointCloud { points, normals } = limits().read_cloud(path, arguments.unit)?;
+    let read = |path, unit, options: CloudOptions| -> anyhow::Result<_> {
+        let PointCloud { points, normals } = limits().read_cloud(path, unit)?;
         Ok(options.cloud(&points, normals.as_deref())?)
     };
-    let source = read(&arguments.source, options.for_source_of(method))?;
-    let target = read(&arguments.target, options)?;
+    let (unit, of_source) = (arguments.unit, options.for_source_of(method));
+    let source = read(&arguments.source, unit, of_source)?;
+    let target_unit = arguments.target_unit.unwrap_or(unit);
+    let target = read(&arguments.target, target_unit, options)?;
     let init = match init {
         Some(path) => {
             limits()
@@ -100,7 +105,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut pipeline = method.build(meters(arguments.max_distance));
     let found = align(&source, &target, &init, &mut pipeline);
 
-    let warnings: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
+    let in_words = |warning: &CloudWarning| match warning {
+        CloudWarning::Extents { .. } => {
+            format!("{warning}: check --unit {unit} and --target-unit {target_unit}")
+        }
+        _ => warning.to_string(),
+    };
+    let warnings: Vec<String> = found.warnings.iter().map(in_words).collect();
     let (pose, termination) = (found.target_from_source(), found.outcome.termination);
     let rows = |m: Matrix6<f64>| [0, 1, 2, 3, 4, 5].map(|i| [0, 1, 2, 3, 4, 5].map(|j| m[(i, j)]));
     let matrix = pose.to_homogeneous();

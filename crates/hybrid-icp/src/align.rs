@@ -20,6 +20,7 @@ use hicp_raster::Rasterizer;
 use thiserror::Error;
 
 use crate::checks::COARSE;
+use crate::warning::Meters;
 
 /// Share of the source points with a counterpart below which a warning follows.
 const LITTLE_OVERLAP: f64 = 0.3;
@@ -27,6 +28,13 @@ const LITTLE_OVERLAP: f64 = 0.3;
 /// Information of a direction, relative to the best determined one, below which only noise
 /// determines it.
 const UNDETERMINED: f64 = 0.01;
+
+/// Ratio of the extents of two clouds without overlap from which a warning follows: less than that
+/// of meters to centimeters.
+const OTHER_UNIT: f64 = 30.0;
+
+/// Largest distance between adjacent coordinates that never matters, also in a cloud of one point.
+const FINE_METERS: f64 = 1e-6;
 
 /// Gates of a registration without a stated one, as shares of the source's diameter.
 const GATES: [f32; 2] = [0.1, 0.02];
@@ -242,8 +250,8 @@ pub enum CloudWarning {
     },
     /// The points are so far from their origin that `f32` rounds their shape.
     #[error(
-        "{side}: coordinates are rounded to {} mm so far from the origin: subtract an offset first",
-        step * 1e3
+        "{side}: coordinates are rounded to steps of {} so far from the origin: subtract an offset first",
+        Meters(*step)
     )]
     CoarseCoordinates {
         /// The cloud.
@@ -267,6 +275,21 @@ pub enum CloudWarning {
     LittleOverlap {
         /// Share of the source points with a counterpart.
         fitness: f64,
+    },
+    /// There is little overlap, and one cloud is many times as large as the other.
+    ///
+    /// An extent is the diagonal of a cloud's bounding box, meters.
+    #[error(
+        "the extent of the source is {}, and that of the target is {}, a ratio of {:.0}: one of them may be in another unit, expected meters",
+        Meters(*source_meters),
+        Meters(*target_meters),
+        source_meters.max(*target_meters) / source_meters.min(*target_meters)
+    )]
+    Extents {
+        /// Extent of the source.
+        source_meters: f64,
+        /// Extent of the target.
+        target_meters: f64,
     },
     /// The pairs do not determine all six directions, as on a plane or a sphere.
     ///
@@ -399,8 +422,26 @@ pub fn align_in<'a>(
         let open = alignment.covariance().is_none();
         open.then_some(CloudWarning::Undetermined)
     };
+    if matches!(reason, Some(CloudWarning::LittleOverlap { .. }))
+        && let [(_, source), (_, target)] = clouds[..]
+    {
+        let [source_meters, target_meters] = [source, target].map(extent);
+        let ratio = source_meters / target_meters;
+        if ratio.is_finite() && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&ratio) && ratio > 0.0 {
+            alignment.warnings.push(CloudWarning::Extents {
+                source_meters,
+                target_meters,
+            });
+        }
+    }
     alignment.warnings.extend(reason);
     alignment
+}
+
+/// Returns the diagonal of a cloud's bounding box, meters; 0 for no points.
+fn extent(cloud: &Cloud) -> f64 {
+    let points = cloud.surfels().iter().map(|surfel| surfel.point);
+    bounds(points).map_or(0.0, |[low, high]| f64::from((high - low).norm()))
 }
 
 /// Returns the warnings about the preparation of a cloud.
@@ -409,10 +450,8 @@ fn warnings_of(side: CloudSide, cloud: &Cloud) -> impl Iterator<Item = CloudWarn
     let skipped = (count > 0).then_some(CloudWarning::PointsSkipped { side, count });
     let estimated = cloud.normals_from().filter(|neighbors| *neighbors > 0);
     let estimated = estimated.map(|neighbors| CloudWarning::NormalsEstimated { side, neighbors });
-    let points = cloud.surfels().iter().map(|surfel| surfel.point);
-    let step = coordinate_step(points.clone());
-    let coarse =
-        bounds(points).is_some_and(|[low, high]| step > COARSE * f64::from((high - low).amax()));
+    let step = coordinate_step(cloud.surfels().iter().map(|surfel| surfel.point));
+    let coarse = step > FINE_METERS && step > COARSE * extent(cloud);
     let coarse = coarse.then_some(CloudWarning::CoarseCoordinates { side, step });
     skipped.into_iter().chain(estimated).chain(coarse)
 }

@@ -132,6 +132,28 @@ fn hostile_clouds_end_in_an_honest_outcome() {
     assert_eq!((cloud.surfels().len(), cloud.n_skipped()), (1000, 3));
 }
 
+#[test]
+fn clouds_in_two_units_cause_a_warning() {
+    let target = points(1000);
+    let millimeters: Vec<_> = target.iter().map(|point| point * 1000.0).collect();
+    let ratio = |source: &[Point3<f32>], init: &Isometry3<f64>| {
+        let found = &registered(&cloud(source), &cloud(&target), init)[0];
+        found.warnings.iter().find_map(|warning| match warning {
+            CloudWarning::Extents {
+                source_meters,
+                target_meters,
+            } => Some((source_meters / target_meters).round()),
+            _ => None,
+        })
+    };
+    assert_eq!(ratio(&millimeters, &Isometry3::identity()), Some(1000.0));
+    // No overlap alone is not a reason.
+    assert_eq!(
+        ratio(&target, &Isometry3::translation(50.0, 0.0, 0.0)),
+        None
+    );
+}
+
 /// Two scans in coordinates of a map, of which one is moved by less than `f32` resolves there.
 #[test]
 fn clouds_far_from_their_origin_cause_a_warning() {
