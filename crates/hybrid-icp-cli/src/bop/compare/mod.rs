@@ -43,6 +43,10 @@ pub(crate) struct Arguments {
     /// The pipelines: names (`hybrid-icp pipelines` lists them) or TOML files.
     #[arg(long, value_name = "A,B,…", value_delimiter = ',', required = true)]
     pipelines: Vec<Source>,
+    /// Override a field of every pipeline, such as milliseconds=30 of those that search; may be
+    /// given several times.
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    overrides: Vec<String>,
     /// The folder to write to, which is created if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -82,14 +86,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 "--pipelines gives {name} twice, expected names that differ from each other, from {INITIAL}, {BASELINE} and {COMPARISON}"
             );
         }
-        pipelines.push((name, source.choose(&[])?));
+        pipelines.push((name, source.choose(&arguments.overrides)?));
     }
     let out = &arguments.out;
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot make the folder {}", out.display()))?;
     arguments.check_files()?;
     let masks = arguments.masks.source()?;
-    let mut comparison = Comparison::new(&arguments.dataset, &arguments.results, &arguments.masks);
+    let overrides = arguments.overrides.iter().map(|set| format!(", {set}"));
+    let settings = arguments.masks.label() + &overrides.collect::<String>();
+    let mut comparison = Comparison::new(&arguments.dataset, &arguments.results, &settings);
     let initial = arguments.evaluate(INITIAL, &arguments.results)?;
     // The targets are the same for all.
     let left_out = initial.left_out();

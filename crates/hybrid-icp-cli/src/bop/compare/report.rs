@@ -12,7 +12,6 @@ use super::interval::interval;
 use super::worst::Worst;
 use crate::bop::eval::{self, Summary};
 use crate::bop::options::DatasetOptions;
-use crate::bop::refine::MaskOptions;
 use crate::options::file_name;
 
 /// Result files of one dataset: the initial one, and that of every pipeline.
@@ -80,19 +79,18 @@ const EXPLAINED: &str = "AR is the mean of the average recalls of VSD, MSSD and 
     the order of the two pipelines is not certain. With few images, intervals are too narrow.";
 
 impl Comparison {
-    /// Starts without entries.
-    pub(super) fn new(dataset: &DatasetOptions, init: &Path, masks: &MaskOptions) -> Self {
+    /// Starts without entries; `settings` continues the sentence about the compared files.
+    pub(super) fn new(dataset: &DatasetOptions, init: &Path, settings: &str) -> Self {
         Self {
             dataset: dataset.root.display().to_string(),
             split: dataset.split.clone(),
             init: init.display().to_string(),
             entries: Vec::new(),
             subject: format!(
-                "{} in {}, split {}{}",
+                "{} in {}, split {}{settings}",
                 file_name(init),
                 dataset.name(),
                 dataset.split,
-                masks.label()
             ),
         }
     }

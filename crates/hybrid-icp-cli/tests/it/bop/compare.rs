@@ -166,7 +166,7 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
                     {"scene_id": 1, "im_id": 99, "obj_id": OBJ, "inst_count": 1}]"#;
     let id = objects.keys().next().unwrap();
     folder.write(targets, first.replace("OBJ", id));
-    let options = "--mask none --no-color --models models --targets targets.json";
+    let options = "--mask none --no-color --models models --targets targets.json --set times=1";
     let words = format!(
         "bop compare --dataset set --results set/initial_synthetic-test.csv --pipelines hybrid --out boxes {options}"
     );
@@ -177,7 +177,7 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
     assert!(rows > Some(1) && boxes["entries"][0]["targets"] == 1);
     assert_eq!(boxes["entries"][2]["ar_interval"], Value::Null);
     let text = folder.read("boxes/compare.md");
-    assert_contains(&text, &["split test, without masks: 1 targets"]);
+    assert_contains(&text, &["split test, without masks, times=1: 1 targets"]);
 
     // `bop refine` alone writes the same poses.
     let words = "bop refine --dataset set --results set/initial_synthetic-test.csv --pipeline hybrid --output alone.csv";
@@ -187,7 +187,7 @@ fn pipelines_are_compared_by_the_numbers_of_eval() {
         rows.iter().map(|row| row.camera_from_object()).collect()
     };
     assert_eq!(poses("alone.csv"), poses("compared/hybrid.csv"));
-    let words = format!("{words} --mask none");
+    let words = format!("{words} --mask none --set times=1");
     folder.command(words).exits(0);
     assert_eq!(poses("alone.csv"), poses("boxes/hybrid.csv"));
 }
