@@ -12,11 +12,11 @@ const MAX_DEPTH_METERS: f32 = 1000.0;
 
 /// Returns the end of warnings about inputs that contradict each other.
 ///
-/// The doctor requires a mask, so the end is empty for a box.
+/// The doctor requires a mask and an initial pose, so the end is empty without them.
 pub(super) fn doctor(inputs: &Inputs) -> &'static str {
-    match inputs.region {
-        Region::Mask(..) => "; `hybrid-icp doctor` looks for the cause",
-        Region::Box(_) => "",
+    match (&inputs.region, &inputs.init) {
+        (Region::Mask(..), Some(_)) => "; `hybrid-icp doctor` looks for the cause",
+        _ => "",
     }
 }
 
@@ -81,13 +81,17 @@ pub(super) fn about_inputs(
         // An estimate is as far away as the depth says.
         None => (String::new(), "", " and --depth-scale"),
     };
+    let other_camera = match files.camera_from_depth {
+        Some(_) => ", --camera-from-depth",
+        None => "",
+    };
     let in_words = |warning| match warning {
         Warning::Diameter { .. } => format!("{model}: {warning}, check --model-unit {unit}"),
         Warning::BehindCamera { .. } => format!("{init}: {warning}{doctor}"),
         Warning::Center { .. } => format!("{}: {warning}", files.camera.display()),
         Warning::NoDepth => format!(
             "{depth}: {warning} at {depth_scale} mm per unit (depths beyond {MAX_DEPTH_METERS} m count as missing): \
-             check --depth-scale and {mask}"
+             check --depth-scale{other_camera} and {mask}"
         ),
         Warning::Depth { .. } => format!(
             "{depth}: {warning}: check --depth-scale (now {depth_scale} mm per unit){pose_unit}{doctor}"
@@ -127,7 +131,9 @@ pub(super) fn about_facts(
 /// Those about a pose that explains nothing end with `doctor`.
 pub(crate) fn about_result(refined: &Refinement, doctor: &str) -> Vec<String> {
     let in_words = |warning: &Warning| match warning {
-        Warning::Unexplained { .. } => format!("{warning}{doctor}"),
+        Warning::Unexplained { .. } | Warning::FoundElsewhere { .. } => {
+            format!("{warning}{doctor}")
+        }
         _ => warning.to_string(),
     };
     refined.warnings().iter().map(in_words).collect()

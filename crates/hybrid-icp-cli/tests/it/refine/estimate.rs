@@ -71,11 +71,11 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
     ] {
         estimate(&scene, region).refuses(parts);
     }
-    // The doctor needs a mask and a pose, so it is no advice for a box.
+    // The doctor needs an initial pose, so it is no advice.
     hicp_io::write_ply(scene.path("mesh.ply"), &car(), LengthUnit::Centimeters).unwrap();
-    for (region, is_advised) in [("--mask mask.png", true), ("--bbox 60,30,200,180", false)] {
+    for region in ["--mask mask.png", "--bbox 60,30,200,180"] {
         let told = estimate(&scene, region).warns(&["--model-unit m"]);
-        assert_eq!(told.err.contains("doctor"), is_advised, "{}", told.err);
+        assert!(!told.err.contains("doctor"), "{}", told.err);
     }
     let dropped = DepthImage::from_meters(320, 240, vec![0.0; 320 * 240]).unwrap();
     hicp_io::write_depth_png(scene.path("depth.png"), &dropped, 0.1).unwrap();
@@ -84,7 +84,7 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
     let reason = scene.json("out.json")["reason"].clone();
     let expected = "no depth was measured in the box, so that ";
     assert!(reason.as_str().unwrap().starts_with(expected), "{reason}");
-    estimate(&scene, "--bbox 60,30,320,240").warns(&["the box ends at 380,270", "not two corners"]);
+    estimate(&scene, "--bbox 60,30,320,240").warns(&["the box ends at (380, 270)", "not two corners"]);
     for bbox in ["320,0,9,9", "-9,0,9,9", "0,240,9,9"] {
         estimate(&scene, &format!("--bbox {bbox}"))
             .fails(&[bbox, "outside of the 320x240 image depth.png"]);
