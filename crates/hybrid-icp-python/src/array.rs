@@ -62,7 +62,8 @@ pub(crate) fn unexpected(name: &str, value: &Bound<'_, PyAny>, expected: &str) -
     let reader = match name {
         "depth" => "; read_depth reads a file",
         "mask" => "; read_mask reads a file",
-        "T_co" => "; read_pose reads a file",
+        "T_co" | "T_ts" => "; read_pose reads a file",
+        "source" | "target" => "; read_cloud reads a file",
         _ => "",
     };
     let is_path =

@@ -77,10 +77,25 @@ struct Options<'a, 'py> {
     axes: Vec<[[f64; 3]; 2]>,
 }
 
+/// Axes of symmetry: a direction and a point of each.
+#[derive(Clone, Debug, Default)]
+struct Axes(Vec<[[f64; 3]; 2]>);
+
+impl<'py> FromPyObject<'_, 'py> for Axes {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let expected = "pairs of a direction and a point, such as [([0, 0, 1], [0, 0, 0])]";
+        let axes = value.extract();
+        axes.map(Self)
+            .map_err(|_| array::unexpected("symmetry_axes", &value, expected))
+    }
+}
+
 #[pymethods]
 impl PyModel {
     #[new]
-    #[pyo3(signature = (vertices, faces, *, unit = "m", samples = 1000, diameter = None, symmetries = None, symmetry_axes = Vec::new(), colors = None))]
+    #[pyo3(signature = (vertices, faces, *, unit = "m", samples = 1000, diameter = None, symmetries = None, symmetry_axes = Axes::default(), colors = None))]
     #[allow(clippy::too_many_arguments)] // Keywords in Python.
     fn new(
         py: Python<'_>,
@@ -90,7 +105,7 @@ impl PyModel {
         samples: usize,
         diameter: Option<f64>,
         symmetries: Option<&Bound<'_, PyAny>>,
-        symmetry_axes: Vec<[[f64; 3]; 2]>,
+        symmetry_axes: Axes,
         colors: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let options = Options::new(unit, samples, diameter, symmetries, symmetry_axes)?;
@@ -125,7 +140,7 @@ impl PyModel {
     /// FileError
     ///     If the file cannot be read or has no mesh. The message names the place.
     #[staticmethod]
-    #[pyo3(signature = (path, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Vec::new()))]
+    #[pyo3(signature = (path, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Axes::default()))]
     fn from_file(
         py: Python<'_>,
         path: PathBuf,
@@ -133,7 +148,7 @@ impl PyModel {
         samples: usize,
         diameter: Option<f64>,
         symmetries: Option<&Bound<'_, PyAny>>,
-        symmetry_axes: Vec<[[f64; 3]; 2]>,
+        symmetry_axes: Axes,
     ) -> PyResult<Self> {
         let options = Options::new(unit, samples, diameter, symmetries, symmetry_axes)?;
         let unit = options.unit;
@@ -194,7 +209,7 @@ impl PyModel {
     /// -------
     /// Model
     #[staticmethod]
-    #[pyo3(signature = (mesh, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Vec::new()))]
+    #[pyo3(signature = (mesh, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Axes::default()))]
     fn from_trimesh(
         py: Python<'_>,
         mesh: &Bound<'_, PyAny>,
@@ -202,7 +217,7 @@ impl PyModel {
         samples: usize,
         diameter: Option<f64>,
         symmetries: Option<&Bound<'_, PyAny>>,
-        symmetry_axes: Vec<[[f64; 3]; 2]>,
+        symmetry_axes: Axes,
     ) -> PyResult<Self> {
         let is_scene = !mesh.hasattr("vertices")? && mesh.hasattr("to_mesh")?;
         let mesh = match is_scene {
@@ -354,7 +369,7 @@ impl<'a, 'py> Options<'a, 'py> {
         samples: usize,
         diameter: Option<f64>,
         symmetries: Option<&'a Bound<'py, PyAny>>,
-        axes: Vec<[[f64; 3]; 2]>,
+        Axes(axes): Axes,
     ) -> PyResult<Self> {
         if samples > MAX_SAMPLES {
             return Err(InputError::new_err(format!(

@@ -282,6 +282,9 @@ impl PyFuser {
     }
 }
 
+/// Motion between two images above which a translation may be in millimeters.
+const FARTHEST_STEP_METERS: f64 = 2.0;
+
 /// Reads a motion of the camera. `None` is a camera that does not move.
 #[allow(non_snake_case)]
 pub(crate) fn motion(
@@ -289,7 +292,15 @@ pub(crate) fn motion(
     covariance: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<CameraMotion> {
     let motion = match T_nc {
-        Some(value) => CameraMotion::new(array::motion(value, "T_nc")?.isometry),
+        Some(value) => {
+            let motion = array::motion(value, "T_nc")?.isometry;
+            let meters = motion.translation.vector.norm();
+            if meters > FARTHEST_STEP_METERS {
+                let moved = format!("T_nc moves the camera by {meters:.1} m between two images");
+                errors::warn(value.py(), &format!("{moved}: check that it is in meters"))?;
+            }
+            CameraMotion::new(motion)
+        }
         None => Ok(CameraMotion::none()),
     };
     let motion = motion.map_err(errors::input)?;
