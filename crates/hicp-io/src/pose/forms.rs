@@ -176,6 +176,9 @@ fn describe(value: &Value) -> String {
             format!("a 4x4 matrix with the last row {row} instead of 0 0 0 1{hint}")
         }
         (_, Some(numbers)) => format!("{} numbers", numbers.len()),
+        (Value::Array(items), None) if items.iter().all(Value::is_object) => {
+            format!("a list of {} objects, of which a file has one", items.len())
+        }
         (value, None) => quote(&value.to_string().chars().take(80).collect::<String>()),
     }
 }

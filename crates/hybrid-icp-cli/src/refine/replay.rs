@@ -34,8 +34,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .lines()
         .zip(1..)
         .map(|(line, number)| {
-            serde_json::from_str(line)
-                .with_context(|| format!("{}:{number}: expected JSON", path.display()))
+            serde_json::from_str(line).with_context(|| {
+                format!(
+                    "{}:{number}: expected a line of a trace, which is JSON",
+                    path.display()
+                )
+            })
         })
         .collect::<anyhow::Result<Vec<Value>>>()?;
     let Some(header) = old.first() else {
