@@ -408,13 +408,18 @@ pub fn align_in<'a>(
         warnings: prepared.collect(),
     };
     let fitness = alignment.fitness();
-    let degenerate = outcome.termination == Termination::Degenerate;
+    let other_unit = extents(&clouds).filter(|_| fitness < LITTLE_OVERLAP);
+    // With few pairs, normals are not to blame.
+    let degenerate = outcome.termination == Termination::Degenerate && outcome.n_pairs() == 0;
+    let few = |(_, cloud): &(_, &Cloud)| cloud.surfels().len() < 6;
+    let by_pairs = other_unit.is_some() || clouds.iter().any(few);
     let bare = clouds
         .iter()
         .rfind(|(_, cloud)| cloud.normals_from() == Some(0));
+    alignment.warnings.extend(other_unit);
     let reason = if let Some(part) = outcome.termination.unsupported_part() {
         Some(CloudWarning::Unsupported { part })
-    } else if let Some((side, _)) = bare.filter(|_| degenerate) {
+    } else if let Some((side, _)) = bare.filter(|_| degenerate && !by_pairs) {
         Some(CloudWarning::NoNormals { side: *side })
     } else if fitness < LITTLE_OVERLAP {
         Some(CloudWarning::LittleOverlap { fitness })
@@ -422,20 +427,22 @@ pub fn align_in<'a>(
         let open = alignment.covariance().is_none();
         open.then_some(CloudWarning::Undetermined)
     };
-    if matches!(reason, Some(CloudWarning::LittleOverlap { .. }))
-        && let [(_, source), (_, target)] = clouds[..]
-    {
-        let [source_meters, target_meters] = [source, target].map(extent);
-        let ratio = source_meters / target_meters;
-        if ratio.is_finite() && !(1.0 / OTHER_UNIT..OTHER_UNIT).contains(&ratio) && ratio > 0.0 {
-            alignment.warnings.push(CloudWarning::Extents {
-                source_meters,
-                target_meters,
-            });
-        }
-    }
     alignment.warnings.extend(reason);
     alignment
+}
+
+/// Returns the warning about two clouds whose extents differ as if their units did.
+fn extents(clouds: &[(CloudSide, &Cloud)]) -> Option<CloudWarning> {
+    let [(_, source), (_, target)] = clouds else {
+        return None;
+    };
+    let [source_meters, target_meters] = [source, target].map(|cloud| extent(cloud));
+    let ratio = source_meters / target_meters;
+    let differ = ratio > 0.0 && ratio.is_finite() && ratio.ln().abs() >= OTHER_UNIT.ln();
+    differ.then_some(CloudWarning::Extents {
+        source_meters,
+        target_meters,
+    })
 }
 
 /// Returns the diagonal of a cloud's bounding box, meters; 0 for no points.
