@@ -166,6 +166,10 @@ fn a_quaternion_of_unknown_order_and_other_files_are_refused() {
     for (name, found) in [
         ("pose_unordered.json", "quaternion of stated order"),
         ("pose_two_tfs.json", "the keys \"transforms\""),
+        (
+            "pose_list.json",
+            "a list of 2 objects, of which a file has one",
+        ),
         ("camera_k.txt", "9 numbers"),
         ("camera_rows.json", "the keys \"K\""),
         ("photo.jpg", "a JPEG image"),

@@ -166,7 +166,7 @@ fn a_trace_is_replayed_to_the_last_digit() {
     // Other files are refused.
     for (content, expected) in [
         ("", "empty, expected a trace"),
-        ("{", "trace.jsonl:1: expected JSON"),
+        ("{", "trace.jsonl:1: expected a line of a trace"),
         ("{\"event\": \"iteration\"}", "expected \"start\""),
         (
             "{\"event\": \"start\", \"version\": 3}",
