@@ -58,7 +58,9 @@ fn clouds_that_do_not_overlap_are_warned_of() {
     );
     assert_eq!(found["termination"], "no_pairs");
     assert_contains(&run_.err, &["do not trust the pose"]);
-    let run_ = folder.command("align a.ply b.pcd --target-unit mm").exits(0);
+    let run_ = folder
+        .command("align a.ply b.pcd --target-unit mm")
+        .exits(0);
     run_.complains(&["a ratio of 1000", "check --unit m and --target-unit mm"]);
 }
 

@@ -84,7 +84,8 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
     let reason = scene.json("out.json")["reason"].clone();
     let expected = "no depth was measured in the box, so that ";
     assert!(reason.as_str().unwrap().starts_with(expected), "{reason}");
-    estimate(&scene, "--bbox 60,30,320,240").warns(&["the box ends at (380, 270)", "not two corners"]);
+    estimate(&scene, "--bbox 60,30,320,240")
+        .warns(&["the box ends at (380, 270)", "not two corners"]);
     for bbox in ["320,0,9,9", "-9,0,9,9", "0,240,9,9"] {
         estimate(&scene, &format!("--bbox {bbox}"))
             .fails(&[bbox, "outside of the 320x240 image depth.png"]);
