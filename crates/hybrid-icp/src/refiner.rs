@@ -31,8 +31,8 @@ pub struct Refinement {
     pub mve: f64,
     /// The probability that the returned pose is right, 0 to 1 ([`Confidence`]).
     ///
-    /// Poses that look alike and explain the image as well lower it, unless the returned pose is
-    /// within 0.25 diameters of the initial one. Accept a pose with 0.95 or more
+    /// Poses that look alike and explain the image as well lower it. They do so less if the
+    /// returned pose is within 0.25 diameters of the initial one. Accept a pose with 0.95 or more
     /// ([`ACCEPTED`](crate::ACCEPTED)).
     pub confidence: f64,
     /// The largest distance to expect of a surface point from its true place, meters.
@@ -44,15 +44,18 @@ pub struct Refinement {
     pub flatness: Option<Flatness>,
     /// The evidence for and against the returned pose, and how well the mask fits it.
     pub evidence: Evidence,
-    /// The number of other poses that look alike and are as likely to be right, at most 4.
+    /// The number of other poses that look alike and explain the image as well, at most 4.
     ///
-    /// 0 if the returned pose is near the initial one. Declared symmetries do not count.
+    /// Declared symmetries do not count.
     pub look_alikes: f64,
     /// The best other pose that a search found; `None` without a search or another pose.
     ///
     /// [`Refiner::alternatives`] has all of them.
     pub runner_up: Option<Alternative>,
 }
+
+/// Least number of measured pixels of the images in which look-alikes of near poses are counted.
+const COARSE_PIXELS: usize = 2500;
 
 impl Refinement {
     /// Returns the reasons not to trust the pose, if there are any ([`warnings_of_result`]).
@@ -259,11 +262,24 @@ impl<S: Stage> Refiner<S> {
         outcome: Outcome,
     ) -> Refinement {
         let pose = &outcome.camera_from_object;
-        let look_alikes = self.look_alikes(problem, start.map(|(init, _)| init), pose);
+        let near = start.zip(problem.model());
+        let near = near.is_some_and(|((init, _), model)| is_near(model, init, pose));
+        let mut look_alikes = if near {
+            0.0
+        } else {
+            self.look_alikes(problem, pose)
+        };
         let mut context = self.workspace.context(problem);
         let mve = self.score.score(&mut context, pose);
-        let (evidence, confidence) = Confidence::at(&mut context, pose, mve, look_alikes);
+        let (evidence, mut confidence) = Confidence::at(&mut context, pose, mve, look_alikes);
         let flatness = Flatness::at(&mut context, pose);
+        if near && let Some((model, observation)) = problem.sides() {
+            // The initial pose chooses among them, so a coarse image suffices to count them.
+            let factor = (observation.n_measured() / COARSE_PIXELS).isqrt();
+            let coarse = observation.decimated(u32::try_from(factor).unwrap_or(u32::MAX));
+            look_alikes = self.look_alikes(&Problem::new(model, &coarse), pose);
+            confidence = confidence.near_initial(look_alikes);
+        }
         Refinement {
             outcome,
             mve_initial: start.map_or(mve, |(_, mve)| mve),
@@ -278,22 +294,10 @@ impl<S: Stage> Refiner<S> {
         }
     }
 
-    /// Returns the number of other poses that are as likely as `pose`.
+    /// Returns the number of other poses that explain the image as well as `pose`.
     ///
-    /// A pose near the initial one is more likely than all others. If colors were compared, they
-    /// decide among the poses that look alike in depth.
-    fn look_alikes(
-        &mut self,
-        problem: &Problem<'_>,
-        init: Option<&Isometry3<f64>>,
-        pose: &Isometry3<f64>,
-    ) -> f64 {
-        let Some(model) = problem.model() else {
-            return 0.0;
-        };
-        if init.is_some_and(|init| is_near(model, init, pose)) {
-            return 0.0;
-        }
+    /// If colors were compared, they decide among the poses that look alike in depth.
+    fn look_alikes(&mut self, problem: &Problem<'_>, pose: &Isometry3<f64>) -> f64 {
         let others = self.workspace.alternatives();
         let found = others.first().map_or(0.0, Alternative::likelihood);
         if others.iter().any(|other| other.color_gap.is_some()) {

@@ -6,6 +6,7 @@ use hicp_sim::{Household, Proportions, SimError, SimRng, invented, stream};
 use hicp_tests::symmetric_pose_distance;
 use hicp_tests::tabletop::{MaskKind, Seen, Tabletop};
 use hybrid_icp::core::{DepthImage, Isometry3, Model, Observation, Problem};
+use hybrid_icp::icp::is_near;
 use hybrid_icp::prelude::{Repeat, Stage};
 use hybrid_icp::score::{Confidence, Misfit, ModelPoints, N_FEATURES};
 use hybrid_icp::{Preset, Refinement, Refiner, presets};
@@ -19,6 +20,9 @@ const PRESETS: [Preset; 3] = [Preset::Local, Preset::Auto, Preset::Search];
 pub struct Case {
     /// The features of the confidence.
     pub features: [f64; N_FEATURES],
+    /// The number of poses that look alike, if the pose is near the initial one. The features have
+    /// 0 then.
+    pub near: Option<f64>,
     /// The stated confidence.
     pub confidence: f64,
     /// The stated errors: the largest of a surface point in diameters, and the rotation in degrees.
@@ -73,11 +77,13 @@ impl Case {
         self.errors.is_some_and(|[distance, _]| distance < 0.1)
     }
 
-    /// Judges a result. `truth` is the true pose, if the model is that of the object.
+    /// Judges the result of a refinement from `init`, or without it.
+    ///
+    /// `truth` is the true pose, if the model is that of the object.
     pub fn new(
         refiner: &mut Refiner,
         (model, observation): (&Model, &Observation),
-        refined: &Refinement,
+        (init, refined): (Option<&Isometry3<f64>>, &Refinement),
         truth: Option<&Isometry3<f64>>,
         (visible, kind): (f64, Kind),
     ) -> Self {
@@ -89,13 +95,16 @@ impl Case {
             let distance = ModelPoints::new(model).mssd(pose, truth) / model.diameter();
             [distance, angle.to_degrees()]
         });
+        let near = init.is_some_and(|init| is_near(model, init, pose));
+        let near = near.then_some(refined.look_alikes);
         Self {
             features: Confidence::features(
                 &refined.evidence,
                 &misfit.unwrap_or_default(),
                 refined.mve,
-                refined.look_alikes,
+                near.map_or(refined.look_alikes, |_| 0.0),
             ),
+            near,
             confidence: refined.confidence,
             expected: [
                 refined.expected_error_meters / model.diameter(),
@@ -276,7 +285,7 @@ fn case(
     Ok(Case::new(
         refiner,
         sides,
-        &refined,
+        ((kind != Kind::Estimated).then_some(&init), &refined),
         truth,
         (seen.visible_share, kind),
     ))

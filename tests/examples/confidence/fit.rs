@@ -1,7 +1,8 @@
 //! The fit of the confidence: a network with one hidden layer.
 
 use hicp_sim::{SimRng, stream};
-use hybrid_icp::score::N_FEATURES;
+use hybrid_icp::core::nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use hybrid_icp::score::{Confidence, N_FEATURES};
 use rand::RngExt;
 
 use crate::cases::Case;
@@ -76,6 +77,48 @@ pub fn print(cases: &[Case]) {
         println!("    ({bias:.4}, [{first},\n     {second}], {outputs:.4?}),");
     }
     println!("];");
+}
+
+/// Fits the confidence in poses near the initial one, and prints its constants.
+pub fn print_near(cases: &[Case]) {
+    let near: Vec<(f64, Confidence, &Case)> = cases
+        .iter()
+        .filter_map(|case| {
+            let base = Confidence::of(&case.features, 1.0);
+            Some((case.near?.ln_1p(), base, case))
+        })
+        .collect();
+    let rows = near.iter().filter(|(_, base, _)| base.probability > 0.0);
+    let rows = rows.map(|(poses, base, case)| {
+        let log_odds = (base.probability / (1.0 - base.probability)).ln();
+        let row = Vector4::new(1.0, log_odds, *poses, poses * log_odds);
+        (row, f64::from(case.right()))
+    });
+    // Newton's method from the confidence as it is.
+    let mut odds = Vector4::new(0.0, 1.0, 0.0, 0.0);
+    for _ in 0..20 {
+        let (mut gradient, mut hessian) = (Vector4::zeros(), Matrix4::zeros());
+        for (row, right) in rows.clone() {
+            let probability = 1.0 / (1.0 + (-odds.dot(&row)).exp());
+            gradient += row * (probability - right);
+            hessian += row * row.transpose() * (probability * (1.0 - probability));
+        }
+        odds -= hessian.lu().solve(&gradient).expect("cases that differ");
+    }
+    println!("const NEAR_ODDS: [f64; 4] = {:.3?};", odds.as_slice());
+    let errors = [0, 1].map(|which| {
+        let (mut sides, mut squares) = (Vector2::zeros(), Matrix2::zeros());
+        for (poses, base, case) in &near {
+            let Some(errors) = case.errors else { continue };
+            let expected = [base.error_meters, base.error_degrees][which];
+            let row = Vector2::new(1.0, *poses);
+            sides += row * (errors[which].max(1e-4) / expected).ln();
+            squares += row * row.transpose();
+        }
+        let fitted = squares.lu().solve(&sides).expect("cases that differ");
+        [fitted.x, fitted.y]
+    });
+    println!("const NEAR_ERRORS: [[f64; 2]; 2] = {errors:.2?};");
 }
 
 fn mean_and_deviation(values: impl Iterator<Item = f64>) -> (f64, f64) {

@@ -3,9 +3,10 @@
 //! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
 //! objects. With `-- fit [CASES]`, it prints the network, fitted on tuning and invented objects: so
 //! many cases with white noise, as many with systematic errors of sensor and model, and half as
-//! many with no measurement outside of the mask. With `-- tuning [CASES]` or `-- distorted
-//! [CASES]`, it reports on other cases of tuning objects, and with `-- cropped [CASES]` on test
-//! objects in images with no measurement outside of the mask.
+//! many with no measurement outside of the mask. With `-- near [CASES]`, it prints the constants
+//! for poses near the initial one, fitted on such cases to the results of the network. With `--
+//! tuning [CASES]` or `-- distorted [CASES]`, it reports on other cases of tuning objects, and with
+//! `-- cropped [CASES]` on test objects in images with no measurement outside of the mask.
 
 mod cases;
 mod fit;
@@ -26,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .and_then(|text| text.parse().ok())
         .unwrap_or(6000);
     match arguments.first().map(String::as_str) {
-        Some("fit") => {
+        Some(name @ ("fit" | "near")) => {
             let parts = [
                 (Images::Noisy, count),
                 (Images::Distorted, count),
@@ -46,7 +47,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     .map(|thread| thread.join().expect("no panic"));
                 parts.flatten().collect()
             });
-            fit::print(&cases);
+            if name == "fit" {
+                fit::print(&cases);
+            } else {
+                fit::print_near(&cases);
+            }
         }
         Some(name @ ("tuning" | "distorted")) => {
             let objects = Objects::Household(&Household::TUNING);

@@ -28,13 +28,14 @@ pub fn cases() -> Option<Vec<Case>> {
                 .find(|i| i.key == key)
                 .expect("an instance");
             let sides = (&*instance.model, &instance.observe());
-            let refined = refiner.refine(sides.0, sides.1, &row.camera_from_object());
+            let init = row.camera_from_object();
+            let refined = refiner.refine(sides.0, sides.1, &init);
             let truth = Some(&instance.truth);
             // The visible share is not read, so all of it counts as visible.
             cases.push(Case::new(
                 &mut refiner,
                 sides,
-                &refined,
+                (Some(&init), &refined),
                 truth,
                 (1.0, Kind::Near),
             ));

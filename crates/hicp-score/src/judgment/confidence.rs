@@ -17,6 +17,12 @@ const MOST_PIXELS: f64 = 22_000.0;
 const NEAREST: f64 = 0.1;
 /// Largest magnitude of a feature.
 const LIMIT: f64 = 20.0;
+/// The log-odds of a pose near its initial one: an offset and the factor of the network's, then the
+/// same per logarithm of the number of poses. Printed by the example `confidence -- near`.
+const NEAR_ODDS: [f64; 4] = [0.434, 1.091, -0.811, -0.215];
+/// The logarithms of its errors relative to the network's: an offset, and the factor of the
+/// logarithm of the number of poses. First in diameters, then in degrees.
+const NEAR_ERRORS: [[f64; 2]; 2] = [[-0.10, 0.28], [-0.12, 0.37]];
 
 /// The calibrated probability that a pose is right, and the error to expect.
 ///
@@ -69,7 +75,8 @@ impl Confidence {
     ///
     /// `look_alikes` is the number of other poses that may be the right one, because they explain
     /// the image as well and nothing is known of the initial pose. With 0, no other pose is
-    /// considered.
+    /// considered. For a pose near an initial one, pass 0, and then call
+    /// [`near_initial`](Self::near_initial).
     ///
     /// Without a model, an image or a rendered pixel, the probability is 0. It also is 0 if the
     /// model's diameter is impossible, or more than ten times the distance of the surface, because
@@ -111,6 +118,28 @@ impl Confidence {
             probability: 0.0,
             error_meters: diameter,
             error_degrees: 180.0,
+        }
+    }
+
+    /// Returns the confidence in a pose that is near an initial pose (`hicp_icp::is_near`).
+    ///
+    /// The initial pose chooses among `look_alikes` other poses, but not always the right one. Call
+    /// this on the confidence without look-alikes. A probability of 0 stays as it is.
+    #[must_use]
+    pub fn near_initial(self, look_alikes: f64) -> Self {
+        if self.probability == 0.0 {
+            return self;
+        }
+        let log_poses = look_alikes.ln_1p();
+        let log_odds = (self.probability / (1.0 - self.probability)).ln();
+        let [offset, factor, lower, flatter] = NEAR_ODDS;
+        let log_odds = offset + lower * log_poses + (factor + flatter * log_poses) * log_odds;
+        let [meters, degrees] =
+            NEAR_ERRORS.map(|[offset, factor]| (offset + factor * log_poses).exp());
+        Self {
+            probability: 1.0 / (1.0 + (-log_odds).exp()),
+            error_meters: self.error_meters * meters,
+            error_degrees: (self.error_degrees * degrees).min(180.0),
         }
     }
 

@@ -134,3 +134,19 @@ fn poses_that_look_alike_lower_the_probability() {
     }
     assert!(last < 0.7, "{last}");
 }
+
+#[test]
+fn poses_that_look_alike_lower_the_probability_near_the_initial_pose_too() {
+    let (_, alone) = judge(&scene(|_, z| z), &at());
+    let mut last = alone.near_initial(0.0);
+    assert!(last.probability > 0.95, "{last:?}");
+    for look_alikes in [0.3, 1.0, 4.0] {
+        let confidence = alone.near_initial(look_alikes);
+        assert!(confidence.probability < last.probability, "{look_alikes}");
+        assert!(confidence.error_meters > last.error_meters);
+        assert!(confidence.error_degrees > last.error_degrees);
+        last = confidence;
+    }
+    let none = Confidence::none(cube().diameter());
+    assert_eq!(none.near_initial(1.0), none);
+}

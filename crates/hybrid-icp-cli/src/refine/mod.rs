@@ -20,7 +20,7 @@ use self::job::JobOptions;
 /// The result is JSON. It has the pose as cam_R_m2c and cam_t_m2c (mm), the pipeline, and the
 /// outcome (refined or kept_initial) with its reason. It has mve_initial and mve, the confidence
 /// (the probability that the pose is right), expected_error_mm and expected_error_degrees, and
-/// look_alikes (the number of other poses that look alike and are as likely). It also has the
+/// look_alikes (the number of other poses that explain the image as well). It also has the
 /// evidence (what agrees with the pose, what contradicts it, and how well the mask fits),
 /// termination, iterations, n_pairs, time_ms, the warnings that are also on standard error, and a
 /// trace with one object per stage. If a pose cannot be refined, the result has the numbers of the

@@ -32,7 +32,7 @@ pub(crate) struct Report {
     confidence: f64,
     expected_error_mm: f64,
     expected_error_degrees: f64,
-    /// The number of other poses that look alike and are as likely to be right.
+    /// The number of other poses that look alike and explain the image as well.
     look_alikes: f64,
     /// The evidence for and against the pose, by the names of its fields.
     evidence: BTreeMap<&'static str, f64>,

@@ -230,8 +230,8 @@ class Result(_Record):
     expected_error_degrees : float
         Rotation error to expect, degrees.
     look_alikes : float
-        Number of other poses that look alike and are as likely to be right, at most 4. 0 if the
-        returned pose is near the initial one. They lower the confidence.
+        Number of other poses that look alike and explain the image as well, at most 4. They lower
+        the confidence, less so if the returned pose is near the initial one.
     mve : float
         Mean VSD estimate of the returned pose: 0 if it explains the image everywhere, 1 if
         nowhere. Imperfect masks raise it for right poses, too; `confidence` does not have this

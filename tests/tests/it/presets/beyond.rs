@@ -288,8 +288,8 @@ fn a_flat_side_is_shifted_to_its_silhouette() {
     assert!(distance < 1e-3, "{distance}");
 }
 
-/// Without a near initial pose, each pose that looks the same may be the right one. With one, they
-/// do not count.
+/// Without a near initial pose, each pose that looks the same may be the right one. With one, the
+/// others are less likely, but still possible.
 #[test]
 fn poses_that_look_the_same_lower_the_confidence_unless_declared() {
     let scene = scene(Household::Plate, 0.3, &mut rng(5));
@@ -303,12 +303,9 @@ fn poses_that_look_the_same_lower_the_confidence_unless_declared() {
     let [turned, equivalent] = found.map(|refined| refined.confidence);
     assert!(turned < 0.7 && equivalent > 0.9, "{turned} {equivalent}");
     let near = [&undeclared, &scene.model].map(|m| refiner.refine(m, &scene.observation, &init));
-    assert_eq!(near[0].look_alikes, 0.0);
+    assert!(near[0].look_alikes > 0.5, "{}", near[0].look_alikes);
     let [near, declared] = near.map(|refined| refined.confidence);
-    assert!(
-        near > 0.8 && (near - declared).abs() < 0.01,
-        "{near} {declared}"
-    );
+    assert!(turned < near && near < declared, "{near} {declared}");
 }
 
 /// Without any time, the search returns the local pose and reports the deadline.

@@ -4,6 +4,7 @@ use hicp_core::{Context, Isometry3};
 use hicp_score::Score;
 
 use crate::alternative::Alternative;
+use crate::stage::search::distinct::Distinct;
 use crate::stage::search::found::Found;
 use crate::stage::search::near_symmetries::NearSymmetries;
 use crate::stage::search::run::Run;
@@ -100,7 +101,8 @@ pub(crate) fn nearest_to_initial(
 ///
 /// A pose looks like another one if the model nearly covers it, such as a mug that is rotated
 /// around its axis while its handle is hidden. At most 4 of them are counted, each by
-/// [`Alternative::likelihood_of`] its gap in score. Declared symmetries are no look-alikes.
+/// [`Alternative::likelihood_of`] its gap in score, if its MSSD from the pose is above a tenth of
+/// the diameter. Declared symmetries are no look-alikes.
 ///
 /// ```
 /// use hicp_icp::LookAlikeCount;
@@ -137,9 +139,14 @@ impl<R: Score, C: Score> LookAlikeCount<R, C> {
         if self.list(context, camera_from_object, 0.0).is_empty() {
             return 0.0;
         }
+        let Some(model) = context.problem.model() else {
+            return 0.0;
+        };
+        let distinct = Distinct::of(model);
         let own = self.score.score(context, camera_from_object);
         let others = self.ranked.poses().iter();
         others
+            .filter(|(_, pose)| distinct.apart(camera_from_object, pose))
             .map(|(_, pose)| Alternative::likelihood_of(self.score.score(context, pose) - own))
             .sum()
     }

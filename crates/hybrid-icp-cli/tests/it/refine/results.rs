@@ -20,8 +20,8 @@ fn the_result_has_every_key_in_its_type() {
     assert!((0.95..=1.0).contains(&confidence), "{result}");
     assert!(result["expected_error_mm"].as_f64().unwrap() < 20.0);
     assert!(result["expected_error_degrees"].as_f64().unwrap() < 20.0);
-    // The result is near the initial pose, so other poses do not count.
-    assert_eq!(result["look_alikes"], 0.0);
+    // The image shows which side of the object is in front.
+    assert!(result["look_alikes"].as_f64().unwrap() < 1e-3);
     let evidence = &result["evidence"];
     assert!(evidence["agrees"].as_f64().unwrap() > 0.9, "{evidence}");
     assert!(
