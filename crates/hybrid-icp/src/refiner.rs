@@ -13,6 +13,9 @@ use crate::preset::Preset;
 use crate::presets;
 use crate::warning::Warning;
 
+/// Least number of measured pixels of the images in which look-alikes of near poses are counted.
+const COARSE_PIXELS: usize = 2500;
+
 /// The result of a refinement: a pose, how it was found, and how well it explains the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -53,9 +56,6 @@ pub struct Refinement {
     /// [`Refiner::alternatives`] has all of them.
     pub runner_up: Option<Alternative>,
 }
-
-/// Least number of measured pixels of the images in which look-alikes of near poses are counted.
-const COARSE_PIXELS: usize = 2500;
 
 impl Refinement {
     /// Returns the reasons not to trust the pose, if there are any ([`warnings_of_result`]).
@@ -274,7 +274,7 @@ impl<S: Stage> Refiner<S> {
         let (evidence, mut confidence) = Confidence::at(&mut context, pose, mve, look_alikes);
         let flatness = Flatness::at(&mut context, pose);
         if near && let Some((model, observation)) = problem.sides() {
-            // The initial pose chooses among them, so a coarse image suffices to count them.
+            // In the full image, their renders would take longer than a refinement.
             let factor = (observation.n_measured() / COARSE_PIXELS).isqrt();
             let coarse = observation.decimated(u32::try_from(factor).unwrap_or(u32::MAX));
             look_alikes = self.look_alikes(&Problem::new(model, &coarse), pose);
