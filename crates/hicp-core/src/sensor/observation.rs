@@ -394,20 +394,20 @@ impl Observation {
             self.depth.height().div_ceil(factor),
         );
         let fine_width = self.depth.width() as usize;
-        let pixels = || {
-            let grid = self.camera.region().grid(step);
-            grid.map(move |(u, v)| v as usize * fine_width + u as usize)
-        };
+        let (mut depth, mut mask) = (Vec::<f32>::new(), Vec::<bool>::new());
+        for v in (0..self.depth.height() as usize).step_by(step) {
+            let row = v * fine_width..(v + 1) * fine_width;
+            depth.extend(self.depth.pixels()[row.clone()].iter().step_by(step));
+            mask.extend(self.mask.pixels()[row].iter().step_by(step));
+        }
         let region = PixelRegion {
             u_min: self.region.u_min.div_ceil(factor),
             v_min: self.region.v_min.div_ceil(factor),
             u_max: self.region.u_max.div_ceil(factor),
             v_max: self.region.v_max.div_ceil(factor),
         };
-        let depth = pixels().map(|i| self.depth.pixels()[i]).collect();
-        let mask: Vec<bool> = pixels().map(|i| self.mask.pixels()[i]).collect();
-        let measured = |i: &usize| self.mask.pixels()[*i] && self.depth.pixels()[*i] > 0.0;
-        let n_measured = pixels().filter(measured).count();
+        let pixels = depth.iter().zip(&mask);
+        let n_measured = pixels.filter(|(z, masked)| **masked && **z > 0.0).count();
         let camera = self.camera.scaled_down(factor);
         let (Ok(depth), Ok(mask)) = (
             DepthImage::from_meters(width, height, depth),

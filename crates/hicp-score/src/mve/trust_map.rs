@@ -6,7 +6,7 @@ use std::sync::Arc;
 use hicp_core::internal::{Surroundings, median};
 use hicp_core::{Observation, PinholeCamera, PixelRegion};
 
-use crate::mve::distances::to_zero;
+use crate::mve::distances::to_border;
 use crate::mve::occlusion::VISIBILITY_TOLERANCE_METERS;
 use crate::mve::surfaces::{Cells, trust_surfaces};
 
@@ -59,23 +59,15 @@ impl TrustMap {
         // A coarse grid bounds the cost, which the first score of an observation pays.
         let step = region.width().max(region.height()).div_ceil(SIDE).max(1);
         let width = region.width().div_ceil(step).max(1);
-        let cells = || region.grid(step);
         let (depth, mask) = (observation.depth(), observation.mask());
-        let masked: Vec<bool> = cells().map(|(u, v)| mask.get(u, v) == Some(true)).collect();
-        let depths: Vec<f32> = cells()
-            .map(|(u, v)| depth.get(u, v).unwrap_or(0.0))
-            .collect();
+        let (mut masked, mut depths) = (Vec::new(), Vec::new());
+        for columns in rows(&region, depth.width()).step_by(step) {
+            masked.extend(mask.pixels()[columns.clone()].iter().step_by(step));
+            depths.extend(depth.pixels()[columns].iter().step_by(step));
+        }
         let area = masked.iter().filter(|on| **on).count() * step * step;
-        let distance_to = |value: bool| {
-            let start = masked
-                .iter()
-                .map(|on| if *on == value { 0.0 } else { f32::INFINITY });
-            let mut distances: Vec<f32> = start.collect();
-            to_zero(&mut distances, width, step as f32);
-            distances
-        };
-        let mut trust = distance_to(false);
-        let middle = middle_of(&depths, &trust);
+        let distances = to_border(&masked, width, step as f32);
+        let middle = middle_of(&depths, &distances);
         let Surroundings { noise, plane } = *Surroundings::of(observation);
         let grid = Cells {
             width,
@@ -90,15 +82,15 @@ impl TrustMap {
             0.0
         };
         let scale = 1.0 / (doubt * BORDER * (area as f32).sqrt() + beyond).max(1.0);
-        let outside = distance_to(true);
         let near = |z: f32| z > 0.0 && f64::from((z - middle).abs()) <= diameter;
-        for ((trust, outside), z) in trust.iter_mut().zip(outside).zip(&depths) {
-            let counts = near(*z);
-            let ramp = ((*trust - outside + beyond) * scale).clamp(0.0, 1.0);
-            *trust = if counts { ramp * ramp } else { 0.0 };
-        }
+        let distances = distances.iter().zip(&depths);
+        let trust = distances.map(|([inside, outside], z)| {
+            let ramp = ((inside - outside + beyond) * scale).clamp(0.0, 1.0);
+            if near(*z) { ramp * ramp } else { 0.0 }
+        });
+        let mut trust: Vec<f32> = trust.collect();
         if let Some(plane) = plane {
-            let off = plane.off_plane(cells().zip(depths.iter().copied()), width, step);
+            let off = plane.off_plane(region.grid(step).zip(depths.iter().copied()), width, step);
             let kept = trust
                 .iter()
                 .zip(&off)
@@ -121,21 +113,27 @@ impl TrustMap {
         }
         let mut weights = Vec::with_capacity(region.area());
         let mut total = 0;
-        for (row, v) in (region.v_min..region.v_max).enumerate() {
-            let start = v as usize * depth.width() as usize;
-            let columns = start + region.u_min as usize..start + region.u_max as usize;
-            let depths = depth.pixels()[columns.clone()].chunks(step);
-            let masked = mask.pixels()[columns].chunks(step);
-            for ((depths, masked), trust) in depths.zip(masked).zip(&trust[row / step * width..]) {
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // At most 255.
-                let trusted = (trust * f32::from(CERTAIN)) as u8;
-                for (z, masked) in depths.iter().zip(masked) {
-                    let measured = *z > 0.0;
-                    let unmeasured = if *masked { CERTAIN } else { 0 };
-                    weights.push(if measured { trusted } else { unmeasured });
-                    total += if measured { u64::from(trusted) } else { 0 };
+        let mut trusted = Vec::new();
+        for (row, columns) in rows(&region, depth.width()).enumerate() {
+            if row % step == 0 {
+                trusted.clear();
+                for trust in &trust[row / step * width..][..width] {
+                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                    // At most 255.
+                    let trust = (trust * f32::from(CERTAIN)) as u8;
+                    trusted.extend(std::iter::repeat_n(trust, step));
                 }
             }
+            let masked = mask.pixels()[columns.clone()].iter();
+            let pixels = depth.pixels()[columns].iter().zip(masked).zip(&trusted);
+            total += pixels
+                .clone()
+                .map(|((z, _), trusted)| if *z > 0.0 { u64::from(*trusted) } else { 0 })
+                .sum::<u64>();
+            weights.extend(pixels.map(|((z, masked), trusted)| {
+                let unmeasured = if *masked { CERTAIN } else { 0 };
+                if *z > 0.0 { *trusted } else { unmeasured }
+            }));
         }
         Self {
             region,
@@ -219,12 +217,21 @@ fn widened(region: &PixelRegion, camera: &PinholeCamera) -> PixelRegion {
     region.grown(border).intersection(&camera.region())
 }
 
+/// Returns the places of the pixels of each row of a region in an image of some width.
+fn rows(region: &PixelRegion, image_width: u32) -> impl Iterator<Item = Range<usize>> + use<> {
+    let PixelRegion { u_min, u_max, .. } = *region;
+    (region.v_min..region.v_max).map(move |v| {
+        let start = v as usize * image_width as usize;
+        start + u_min as usize..start + u_max as usize
+    })
+}
+
 /// Returns the median depth of the inner half of the mask, meters, from distances to its border.
-fn middle_of(depths: &[f32], distances: &[f32]) -> f32 {
-    let finite = distances.iter().copied().filter(|d| d.is_finite());
+fn middle_of(depths: &[f32], distances: &[[f32; 2]]) -> f32 {
+    let finite = distances.iter().map(|d| d[0]).filter(|d| d.is_finite());
     let inner = 0.5 * finite.fold(0.0, f32::max);
     let pixels = depths.iter().zip(distances);
-    let within = pixels.filter(|(z, distance)| **z > 0.0 && **distance >= inner.max(1.0));
+    let within = pixels.filter(|(z, distance)| **z > 0.0 && distance[0] >= inner.max(1.0));
     let mut inside: Vec<f32> = within.map(|(z, _)| *z).collect();
     median(&mut inside, f32::total_cmp).unwrap_or(f32::INFINITY)
 }
