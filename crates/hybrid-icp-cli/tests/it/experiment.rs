@@ -82,7 +82,7 @@ fn a_killed_study_resumes_to_the_same_bytes() {
     let folder = meshes(&[Household::Mug, Household::Book]);
     let command = |out: &str, threads: u32| {
         format!(
-            "experiment init-noise --objects meshes --poses 30 --no-times --out {out} --threads {threads}"
+            "experiment init-noise --objects meshes --poses 10 --no-times --out {out} --threads {threads}"
         )
     };
     folder.command(command("whole", 2)).exits(0);

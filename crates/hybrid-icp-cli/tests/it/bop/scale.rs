@@ -11,10 +11,13 @@ const OUTPUT: &str = "out.csv";
 const JOURNAL: &str = "out.csv.journal";
 
 /// Kills a run on one thread after one of four images, and returns its journal.
-fn killed(world: &World) -> Vec<u8> {
-    let words = "bop refine --dataset . --results in.csv --output out.csv --no-time --threads 1";
+fn killed(world: &World, options: &str) -> Vec<u8> {
+    let words = "bop refine --dataset . --results in.csv --output out.csv --threads 1";
     let mut program = program(world.root());
-    program.args(words.split(' ')).stdout(Stdio::null());
+    program
+        .args(words.split(' '))
+        .args(options.split(' '))
+        .stdout(Stdio::null());
     let mut child = program.spawn().unwrap();
     wait_for_lines(&mut child, &world.path(JOURNAL), 2);
     // This sends SIGKILL on systems with signals.
@@ -33,7 +36,7 @@ fn a_killed_run_continues_to_the_same_bytes() {
     assert!(!world.path(JOURNAL).exists());
     world.write("out.csv", "the user's");
 
-    let held = killed(&world);
+    let held = killed(&world, "--no-time");
     // There is no partial output.
     assert_eq!(world.bytes(OUTPUT), b"the user's");
     world
@@ -93,7 +96,7 @@ fn images_of_damaged_journal_lines_are_refined_again() {
     let world = World::new();
     world.refined(&grouped_for_signals(&world), "--no-time");
     let expected = world.bytes(OUTPUT);
-    let held = killed(&world);
+    let held = killed(&world, "--no-time");
     let begin = held.iter().position(|byte| *byte == b'\n').unwrap() + 1;
     let length = held[begin..].iter().position(|b| *b == b'\n').unwrap();
     // The lines are one that does not parse, one of another image, and one without its end.
@@ -115,7 +118,7 @@ fn a_run_continues_only_with_the_files_that_it_started_with() {
     let world = World::new();
     world.refined(&grouped_for_signals(&world), "--no-time");
     let expected = world.bytes(OUTPUT);
-    let held = killed(&world);
+    let held = killed(&world, "--no-time");
     let refused = |name: &str, parts: [&str; 2]| {
         let name = format!("out.csv.journal, line 1: found \"{name}=");
         let run = world.run("--no-time --resume").exits(1);
@@ -167,10 +170,12 @@ fn a_continued_run_repeats_the_warnings() {
         let path = world.scene(scene).join("scene_camera.json");
         world.replace(path, "\"depth_scale\":0.1", "\"depth_scale\":1.0");
     }
-    let (whole, _) = world.refine(&grouped_for_signals(&world), "--no-time");
+    // A search for a pose at the wrong distance would take long.
+    let options = "--no-time --pipeline local";
+    let (whole, _) = world.refine(&grouped_for_signals(&world), options);
     let whole = whole.warns(&["check depth_scale"]);
-    killed(&world);
-    let run = world.run("--no-time --resume").exits(0);
+    killed(&world, options);
+    let run = world.run(&format!("{options} --resume")).exits(0);
     run.prints(&["frames from the journal"]);
     assert_eq!(run.err, whole.err);
 }
