@@ -7,7 +7,7 @@ use super::config::{PathDirection, SEQUENTIAL, TrajectoryConfig};
 use super::rule::FusionRule;
 use super::runner::TrajectoryRunner;
 use crate::error::ExperimentError;
-use crate::study::{ALL, Column, Columns, Design, Fields, Group, Layout, Models, Worker, quoted};
+use crate::study::{ALL, Design, Fields, Group, Layout, Models, Worker, quoted};
 use crate::subject::Subject;
 
 /// Largest number of trajectories per object and bin.
@@ -19,19 +19,8 @@ const MAX_METHODS: usize = 100;
 
 impl Design for TrajectoryConfig {
     const ROWS_FILE: &'static str = "trajectories.csv";
-    const COLUMNS: &'static Columns = &[
-        ("object", Column::Object),
-        ("trajectory", Column::Case),
-        ("bin", Column::Bin),
-        ("underlying", Column::Setting),
-        ("method", Column::Variant),
-        ("vsd_initial", Column::VsdInitial),
-        ("vsd_final", Column::VsdFinal),
-        ("add_final_mm", Column::AddFinalMm),
-        ("n_estimates", Column::Steps),
-        ("mahalanobis_squared", Column::MahalanobisSquared),
-        ("note", Column::Note),
-    ];
+    const COLUMNS: &'static str = "object,trajectory,bin,underlying,method,vsd_initial,vsd_final,\
+        add_final_mm,n_estimates,mahalanobis_squared,note";
 
     fn check(&self, fields: &Fields<'_>) -> Result<(), IoError> {
         let (is_valid, found) = (self.experiment == SEQUENTIAL, quoted(&self.experiment));

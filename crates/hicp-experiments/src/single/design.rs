@@ -5,9 +5,7 @@ use hicp_io::IoError;
 use super::config::Config;
 use super::runner::Runner;
 use crate::error::ExperimentError;
-use crate::study::{
-    Column, Columns, Design, Fields, Group, Layout, MAX_CELLS, Models, Worker, quoted,
-};
+use crate::study::{Design, Fields, Group, Layout, MAX_CELLS, Models, Worker, quoted};
 use crate::subject::Subject;
 
 /// Largest number of cases per object.
@@ -15,21 +13,8 @@ const MAX_POSES: u64 = 1_000_000;
 
 impl Design for Config {
     const ROWS_FILE: &'static str = "cases.csv";
-    const COLUMNS: &'static Columns = &[
-        ("object", Column::Object),
-        ("case", Column::Case),
-        ("variant", Column::Variant),
-        ("level", Column::Setting),
-        ("bin", Column::Bin),
-        ("vsd_initial", Column::VsdInitial),
-        ("vsd_final", Column::VsdFinal),
-        ("add_final_mm", Column::AddFinalMm),
-        ("iterations", Column::Steps),
-        ("termination", Column::Termination),
-        ("cpu_ms", Column::CpuMs),
-        ("regimes", Column::Regimes),
-        ("note", Column::Note),
-    ];
+    const COLUMNS: &'static str = "object,case,variant,level,bin,vsd_initial,vsd_final,\
+        add_final_mm,iterations,termination,cpu_ms,regimes,note";
 
     fn check(&self, fields: &Fields<'_>) -> Result<(), IoError> {
         fields.count("poses", MAX_POSES)?;

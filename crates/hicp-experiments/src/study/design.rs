@@ -10,7 +10,7 @@ use super::fields::Fields;
 use super::group::Group;
 use super::layout::Layout;
 use super::models::Models;
-use super::row::{Columns, Outcome};
+use super::row::Outcome;
 use crate::error::ExperimentError;
 use crate::subject::Subject;
 
@@ -23,8 +23,8 @@ pub type Worker<'a> = Box<dyn FnMut(usize, u64) -> Vec<Outcome> + 'a>;
 pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwned {
     /// Name of the file of rows.
     const ROWS_FILE: &'static str;
-    /// The columns of that file.
-    const COLUMNS: &'static Columns;
+    /// The names of the columns of that file, separated by commas.
+    const COLUMNS: &'static str;
 
     /// Checks every field that was read, or that a caller has changed.
     ///

@@ -16,7 +16,7 @@ pub use group::{ALL, FAULTY_MASK, Group, HIGH, LOW, NOISY, NOISY_DEPTH, NOISY_MO
 pub use layout::Layout;
 pub use models::Models;
 pub use records::{CameraRecord, ObjectRecord};
-pub use row::{Column, Columns, Measured, Outcome, Row};
+pub use row::{Measured, Outcome, Row};
 pub(crate) use row::{quoted, to_csv};
 pub use run::{RunOptions, run};
 pub use stored::{CONFIG_FILE, StudyOf};

@@ -1,5 +1,6 @@
 //! The rows of a study, written to and read from CSV.
 
+use std::collections::HashMap;
 use std::str::FromStr;
 
 /// The result of one variant for one case in one setting.
@@ -49,36 +50,16 @@ pub struct Measured {
 /// The figures of a row, or the reason why there are none.
 pub type Outcome = Result<Measured, String>;
 
-/// The part of a row that a column holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the fields of `Row` and `Measured`")]
-pub enum Column {
-    Object,
-    Case,
-    Setting,
-    Variant,
-    Bin,
-    VsdInitial,
-    VsdFinal,
-    AddFinalMm,
-    Steps,
-    Termination,
-    CpuMs,
-    Regimes,
-    MahalanobisSquared,
-    Note,
-}
-
-/// The columns of a file of rows, in order, with their names.
-pub type Columns = [(&'static str, Column)];
-
-/// The columns that identify a row.
-const PLACE: [Column; 5] = [
-    Column::Object,
-    Column::Case,
-    Column::Setting,
-    Column::Variant,
-    Column::Bin,
+/// The columns that identify a row. A study has one of two names for some of them.
+const PLACE: [&str; 8] = [
+    "object",
+    "case",
+    "trajectory",
+    "level",
+    "underlying",
+    "variant",
+    "method",
+    "bin",
 ];
 /// The termination of a case that could not be created.
 const NOT_MADE: &str = "not_made";
@@ -100,14 +81,12 @@ impl Row {
     }
 
     /// Returns rows as CSV, one per line, without a header. Numbers have a fixed number of digits.
-    pub(crate) fn to_csv(columns: &Columns, rows: &[Self]) -> String {
-        to_csv(
-            rows.iter()
-                .map(|row| columns.iter().map(|c| row.field(c.1))),
-        )
+    pub(crate) fn to_csv(columns: &str, rows: &[Self]) -> String {
+        let fields = |row: &Self| columns.split(',').map(|column| row.field(column)).collect();
+        to_csv(rows.iter().map(fields).collect::<Vec<Vec<_>>>())
     }
 
-    fn field(&self, column: Column) -> String {
+    fn field(&self, column: &str) -> String {
         let measured = self.measured.as_ref();
         let number = |digits: usize, value: fn(&Measured) -> Option<f64>| {
             let value = measured.and_then(value);
@@ -115,45 +94,42 @@ impl Row {
         };
         let count = |count: Option<usize>| count.map_or_else(String::new, |n| n.to_string());
         match column {
-            Column::Object => self.object.clone(),
-            Column::Case => self.case.to_string(),
-            Column::Setting => self.setting.clone(),
-            Column::Variant => self.variant.clone(),
-            Column::Bin => count(self.bin),
-            Column::VsdInitial => number(6, |m| Some(m.vsd_initial)),
-            Column::VsdFinal => number(6, |m| Some(m.vsd_final)),
-            Column::AddFinalMm => number(4, |m| Some(m.add_final_mm)),
-            Column::Steps => count(measured.map(|m| m.steps)),
-            Column::Termination => measured.map_or(NOT_MADE, |m| &m.termination).to_owned(),
-            Column::CpuMs => number(3, |m| m.cpu_ms),
-            Column::Regimes => measured.map_or_else(String::new, |m| m.regimes.clone()),
-            Column::MahalanobisSquared => number(4, |m| m.mahalanobis_squared),
-            Column::Note => self.note.replace(['\n', '\r'], " "),
+            "object" => self.object.clone(),
+            "case" | "trajectory" => self.case.to_string(),
+            "level" | "underlying" => self.setting.clone(),
+            "variant" | "method" => self.variant.clone(),
+            "bin" => count(self.bin),
+            "vsd_initial" => number(6, |m| Some(m.vsd_initial)),
+            "vsd_final" => number(6, |m| Some(m.vsd_final)),
+            "add_final_mm" => number(4, |m| Some(m.add_final_mm)),
+            "iterations" | "n_estimates" => count(measured.map(|m| m.steps)),
+            "termination" => measured.map_or(NOT_MADE, |m| &m.termination).to_owned(),
+            "cpu_ms" => number(3, |m| m.cpu_ms),
+            "regimes" => measured.map_or_else(String::new, |m| m.regimes.clone()),
+            "mahalanobis_squared" => number(4, |m| m.mahalanobis_squared),
+            "note" => self.note.replace(['\n', '\r'], " "),
+            other => unreachable!("no study has the column {other}"),
         }
     }
 
     /// Reads the figures of this row from a line, and checks the other fields.
-    pub(crate) fn read(
-        self,
-        columns: &Columns,
-        line: &csv::StringRecord,
-    ) -> Result<Self, Mismatch> {
-        if line.len() != columns.len() {
-            let (found, expected) = (line.len(), columns.len());
-            return Err((format!("{found} fields"), expected.to_string()));
+    pub(crate) fn read(self, columns: &str, line: &csv::StringRecord) -> Result<Self, Mismatch> {
+        let names = columns.split(',');
+        let expected = names.clone().count();
+        if line.len() != expected {
+            return Err((format!("{} fields", line.len()), expected.to_string()));
         }
-        let line = Line { columns, line };
-        let is_made = match line.text(Column::Termination) {
-            "" => !line.text(Column::Steps).is_empty(),
+        let line = Line(names.zip(line).collect());
+        let is_made = match line.text("termination") {
+            "" => !line.text("iterations").is_empty() || !line.text("n_estimates").is_empty(),
             termination => termination != NOT_MADE,
         };
         let row = self.with(match is_made {
             true => Ok(line.measured()?),
-            false => Err(line.text(Column::Note).to_owned()),
+            false => Err(line.text("note").to_owned()),
         });
-        for column in PLACE {
-            let (name, found) = line.get(column);
-            let expected = row.field(column);
+        for name in PLACE.into_iter().filter(|name| line.0.contains_key(name)) {
+            let (found, expected) = (line.text(name), row.field(name));
             if found != expected {
                 let (found, expected) = (quoted(found), quoted(&expected));
                 let why = "by config.json and the order in which a run writes rows";
@@ -162,11 +138,6 @@ impl Row {
         }
         Ok(row)
     }
-}
-
-/// Returns the header line of a file of rows.
-pub(crate) fn header(columns: &Columns) -> String {
-    to_csv([columns.iter().map(|column| column.0)])
 }
 
 /// Returns records as CSV.
@@ -189,22 +160,13 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("{shown:?}{more}")
 }
 
-/// A line with access to its fields by column.
-struct Line<'a> {
-    columns: &'a Columns,
-    line: &'a csv::StringRecord,
-}
+/// The fields of a line by column.
+struct Line<'a>(HashMap<&'a str, &'a str>);
 
 impl<'a> Line<'a> {
-    /// Returns the name and the text of a column. If there is no such column, both are empty.
-    fn get(&self, column: Column) -> (&'static str, &'a str) {
-        let mut fields = self.columns.iter().zip(self.line);
-        let field = fields.find(|(c, _)| c.1 == column);
-        field.map_or(("", ""), |(column, text)| (column.0, text))
-    }
-
-    fn text(&self, column: Column) -> &'a str {
-        self.get(column).1
+    /// Returns the text of a column. If there is no such column, it is empty.
+    fn text(&self, column: &str) -> &'a str {
+        self.0.get(column).copied().unwrap_or_default()
     }
 
     fn measured(&self) -> Result<Measured, Mismatch> {
@@ -216,27 +178,31 @@ impl<'a> Line<'a> {
             "" => Ok(None),
             _ => positive(column).map(Some),
         };
+        let steps = match self.0.contains_key("iterations") {
+            true => "iterations",
+            false => "n_estimates",
+        };
         Ok(Measured {
-            vsd_initial: share(Column::VsdInitial)?,
-            vsd_final: share(Column::VsdFinal)?,
-            add_final_mm: positive(Column::AddFinalMm)?,
-            steps: self.number(Column::Steps, |_| true, "a number")?,
-            termination: self.text(Column::Termination).to_owned(),
-            cpu_ms: optional(Column::CpuMs)?,
-            regimes: self.text(Column::Regimes).to_owned(),
-            mahalanobis_squared: optional(Column::MahalanobisSquared)?,
+            vsd_initial: share("vsd_initial")?,
+            vsd_final: share("vsd_final")?,
+            add_final_mm: positive("add_final_mm")?,
+            steps: self.number(steps, |_| true, "a number")?,
+            termination: self.text("termination").to_owned(),
+            cpu_ms: optional("cpu_ms")?,
+            regimes: self.text("regimes").to_owned(),
+            mahalanobis_squared: optional("mahalanobis_squared")?,
         })
     }
 
     fn number<T: FromStr>(
         &self,
-        column: Column,
+        column: &str,
         is_valid: fn(&T) -> bool,
         expected: &str,
     ) -> Result<T, Mismatch> {
-        let (name, text) = self.get(column);
+        let text = self.text(column);
         let value = text.parse().ok().filter(is_valid);
-        value.ok_or_else(|| (format!("{name} {}", quoted(text)), expected.to_owned()))
+        value.ok_or_else(|| (format!("{column} {}", quoted(text)), expected.to_owned()))
     }
 }
 
@@ -244,7 +210,7 @@ impl<'a> Line<'a> {
 mod tests {
     use super::*;
 
-    const COLUMNS: &Columns = <crate::Config as crate::Design>::COLUMNS;
+    const COLUMNS: &str = <crate::Config as crate::Design>::COLUMNS;
 
     fn row() -> Row {
         Row {
@@ -292,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_wrong_field_is_named() {
-        let mut fields: Vec<String> = COLUMNS.iter().map(|c| row().field(c.1)).collect();
+        let mut fields: Vec<String> = COLUMNS.split(',').map(|c| row().field(c)).collect();
         fields[6] = "NaN".to_owned();
         let (found, _) = row()
             .read(COLUMNS, &csv::StringRecord::from(fields))

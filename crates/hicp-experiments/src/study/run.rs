@@ -11,7 +11,7 @@ use hicp_io::{IoError, IoErrorKind, Place, ReadLimits, RowLog, is_absent, write_
 use super::design::Design;
 use super::fields::Fields;
 use super::models::Models;
-use super::row::{Row, header};
+use super::row::Row;
 use super::stored::{CONFIG_FILE, parse_rows, read_config};
 use crate::error::ExperimentError;
 use crate::subject::Subject;
@@ -129,13 +129,14 @@ fn open<D: Design>(
             return Err(IoError::new(stored, Place::Line(line), found, expected).into());
         }
     }
-    let (header, rows_per_case) = (header(D::COLUMNS), config.layout().rows_per_case());
-    let resumed = RowLog::resume(&path, header.trim_end(), rows_per_case, limits);
+    let rows_per_case = config.layout().rows_per_case();
+    let resumed = RowLog::resume(&path, D::COLUMNS, rows_per_case, limits);
     let (log, cases) = resumed.map_err(|error| match limits.read_text(&path) {
         Err(encoding) if encoding.kind == IoErrorKind::Encoding => encoding,
         _ => error,
     })?;
-    let rows = parse_rows(config, limits, &path, &(header + &cases.join("\n")))?.len();
+    let text = format!("{}\n{}", D::COLUMNS, cases.join("\n"));
+    let rows = parse_rows(config, limits, &path, &text)?.len();
     if rows != cases.len() * rows_per_case {
         let expected = format!("{}, one per line", cases.len() * rows_per_case);
         return Err(IoError::new(path, None, format!("{rows} rows"), expected).into());

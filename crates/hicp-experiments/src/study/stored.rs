@@ -6,7 +6,7 @@ use hicp_io::{IoError, Place, ReadLimits};
 
 use super::design::Design;
 use super::fields::Fields;
-use super::row::{Mismatch, Row, header, quoted};
+use super::row::{Mismatch, Row, quoted};
 use crate::error::ExperimentError;
 
 /// Name of the file of the configuration.
@@ -72,10 +72,10 @@ pub(crate) fn parse_rows<D: Design>(
 ) -> Result<Vec<Row>, IoError> {
     let wrong =
         |line, (found, expected): Mismatch| IoError::new(path, Place::Line(line), found, expected);
-    let header = header(D::COLUMNS);
+    let header = format!("{}\n", D::COLUMNS);
     let Some(lines) = text.strip_prefix(&header) else {
         let found = quoted(text.split('\n').next().unwrap_or_default());
-        let expected = format!("the columns {}", header.trim_end());
+        let expected = format!("the columns {}", D::COLUMNS);
         return Err(wrong(1, (found, expected)));
     };
     let layout = config.layout();

@@ -192,14 +192,14 @@ fn the_committed_configurations_are_read() {
         folder.write(CONFIG_FILE, config);
         if name == "beyond" {
             let row = "\nbowl,0,hybrid,perfect,0,0.05,0.04,1.5,9,converged,2.5,,\n";
-            folder.write(Config::ROWS_FILE, header::<Config>() + row);
+            folder.write(Config::ROWS_FILE, format!("{}{row}", Config::COLUMNS));
             let study = folder.study::<Config>();
             assert_eq!(study.config.levels.len(), 14, "{name}");
         } else {
             let row = "\nbowl,0,0,hybrid,last-estimate,0.05,0.04,1.5,9,2.5,\n";
             folder.write(
                 TrajectoryConfig::ROWS_FILE,
-                header::<TrajectoryConfig>() + row,
+                format!("{}{row}", TrajectoryConfig::COLUMNS),
             );
             let study = folder.study::<TrajectoryConfig>();
             assert_eq!(study.config.bins, 10, "{name}");

@@ -30,7 +30,7 @@ impl Stored {
         let presets = [Preset::Hybrid, Preset::NnPointToPoint].map(Variant::preset);
         let mut config = Config::new(Experiment::InitNoise, &subjects(), &presets, 2, 3).unwrap();
         config.bins = 2;
-        let mut text = header::<Config>() + "\n";
+        let mut text = format!("{}\n", Config::COLUMNS);
         for object in ["mug", "book"] {
             for case in 0..2 {
                 for variant in ["hybrid", "nn-point-to-point"] {
@@ -48,7 +48,7 @@ impl Stored {
         let presets = [Preset::Hybrid, Preset::ProjectiveCascadePointPlane];
         let mut config = TrajectoryConfig::new(&subjects(), &presets, 1, 3).unwrap();
         config.methods.truncate(2);
-        let mut text = header::<TrajectoryConfig>() + "\n";
+        let mut text = format!("{}\n", TrajectoryConfig::COLUMNS);
         for trajectory in 0..3 {
             for object in ["mug", "book"] {
                 for underlying in presets {
@@ -153,14 +153,6 @@ fn error_of_kind<T: std::fmt::Debug>(
         Err(ExperimentError::Io(error)) if error.kind == kind => error,
         result => panic!("{result:?}"),
     }
-}
-
-fn header<D: Design>() -> String {
-    D::COLUMNS
-        .iter()
-        .map(|column| column.0)
-        .collect::<Vec<_>>()
-        .join(",")
 }
 
 #[test]
