@@ -12,15 +12,10 @@ pub(crate) fn carton() -> Solid {
 
 /// A toy car: a body, a cabin and four wheels.
 pub(crate) fn car() -> Solid {
+    #[rustfmt::skip]
     let body = [
-        (-0.09, 0.0),
-        (0.09, 0.0),
-        (0.09, 0.022),
-        (0.045, 0.03),
-        (0.02, 0.055),
-        (-0.055, 0.055),
-        (-0.075, 0.034),
-        (-0.09, 0.03),
+        (-0.09, 0.0), (0.09, 0.0), (0.09, 0.022), (0.045, 0.03), (0.02, 0.055), (-0.055, 0.055),
+        (-0.075, 0.034), (-0.09, 0.03),
     ];
     let wheel = Solid::lathe(
         &refine(
@@ -69,13 +64,9 @@ pub(crate) fn laptop() -> Solid {
 
 /// A camera: a body, an off-center lens, and a viewfinder.
 pub(crate) fn camera() -> Solid {
+    #[rustfmt::skip]
     let lens = [
-        (0.0, -0.02),
-        (0.03, -0.02),
-        (0.03, 0.02),
-        (0.027, 0.035),
-        (0.023, 0.035),
-        (0.018, 0.025),
+        (0.0, -0.02), (0.03, -0.02), (0.03, 0.02), (0.027, 0.035), (0.023, 0.035), (0.018, 0.025),
         (0.0, 0.025),
     ];
     let forward = Isometry3::rotation(Vector3::x() * std::f64::consts::FRAC_PI_2);
@@ -92,15 +83,10 @@ pub(crate) fn camera() -> Solid {
 
 /// Headphones: two cups and a band, symmetric under a half rotation.
 pub(crate) fn headphones() -> Solid {
+    #[rustfmt::skip]
     let cup = [
-        (0.0, -0.014),
-        (0.028, -0.014),
-        (0.034, -0.008),
-        (0.034, 0.008),
-        (0.03, 0.014),
-        (0.02, 0.014),
-        (0.016, 0.006),
-        (0.0, 0.006),
+        (0.0, -0.014), (0.028, -0.014), (0.034, -0.008), (0.034, 0.008), (0.03, 0.014),
+        (0.02, 0.014), (0.016, 0.006), (0.0, 0.006),
     ];
     // The hollow side faces inward, along -x of the right cup.
     let inward = Isometry3::rotation(Vector3::y() * -std::f64::consts::FRAC_PI_2);

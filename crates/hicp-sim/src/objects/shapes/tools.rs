@@ -7,37 +7,23 @@ use crate::objects::solid::Solid;
 
 /// An angle bracket of two thin plates.
 pub(crate) fn bracket() -> Solid {
+    #[rustfmt::skip]
     let corner = [
-        (0.0, 0.0),
-        (0.09, 0.0),
-        (0.09, 0.004),
-        (0.004, 0.004),
-        (0.004, 0.13),
-        (0.0, 0.13),
+        (0.0, 0.0), (0.09, 0.0), (0.09, 0.004), (0.004, 0.004), (0.004, 0.13), (0.0, 0.13),
     ];
     Solid::prism(&subdivide(&corner, 0.004), (0.002, 0.002), 0.05, 12)
 }
 
 /// A hammer with an asymmetric head.
 pub(crate) fn hammer() -> Solid {
+    #[rustfmt::skip]
     let head = [
-        (-0.055, -0.004),
-        (-0.02, -0.014),
-        (0.03, -0.014),
-        (0.03, -0.018),
-        (0.05, -0.018),
-        (0.05, 0.018),
-        (0.03, 0.018),
-        (0.03, 0.014),
-        (-0.02, 0.014),
-        (-0.055, 0.010),
+        (-0.055, -0.004), (-0.02, -0.014), (0.03, -0.014), (0.03, -0.018), (0.05, -0.018),
+        (0.05, 0.018), (0.03, 0.018), (0.03, 0.014), (-0.02, 0.014), (-0.055, 0.010),
     ];
+    #[rustfmt::skip]
     let handle = [
-        (0.0, -0.21),
-        (0.015, -0.21),
-        (0.012, -0.12),
-        (0.010, 0.0),
-        (0.0, 0.0),
+        (0.0, -0.21), (0.015, -0.21), (0.012, -0.12), (0.010, 0.0), (0.0, 0.0),
     ];
     let lying = Isometry3::rotation(Vector3::x() * std::f64::consts::FRAC_PI_2);
     Solid::lathe(&refine(&handle, 0.01), 32).with(
@@ -48,13 +34,9 @@ pub(crate) fn hammer() -> Solid {
 
 /// A clothes iron: a wedge with a handle.
 pub(crate) fn iron() -> Solid {
+    #[rustfmt::skip]
     let sole = [
-        (-0.10, -0.055),
-        (0.02, -0.055),
-        (0.08, -0.03),
-        (0.13, 0.0),
-        (0.08, 0.03),
-        (0.02, 0.055),
+        (-0.10, -0.055), (0.02, -0.055), (0.08, -0.03), (0.13, 0.0), (0.08, 0.03), (0.02, 0.055),
         (-0.10, 0.055),
     ];
     let upper = sole.map(|(x, y)| (0.8 * x - 0.012, 0.7 * y));
@@ -74,13 +56,9 @@ pub(crate) fn iron() -> Solid {
 
 /// A kitchen knife: a thin blade and a thicker handle.
 pub(crate) fn knife() -> Solid {
+    #[rustfmt::skip]
     let blade = [
-        (0.0, -0.014),
-        (0.105, -0.014),
-        (0.135, -0.006),
-        (0.15, 0.008),
-        (0.12, 0.012),
-        (0.0, 0.012),
+        (0.0, -0.014), (0.105, -0.014), (0.135, -0.006), (0.15, 0.008), (0.12, 0.012), (0.0, 0.012),
     ];
     Solid::prism(&subdivide(&blade, 0.003), (0.06, 0.0), 0.002, 2).with(
         &Solid::cuboid(Vector3::new(0.12, 0.022, 0.016), 11),
@@ -90,11 +68,9 @@ pub(crate) fn knife() -> Solid {
 
 /// A roll of tape: a ring, symmetric when turned upside down.
 pub(crate) fn tape() -> Solid {
+    #[rustfmt::skip]
     let section = [
-        (0.036, -0.012),
-        (0.055, -0.012),
-        (0.055, 0.012),
-        (0.036, 0.012),
+        (0.036, -0.012), (0.055, -0.012), (0.055, 0.012), (0.036, 0.012),
     ];
     Solid::lathe(&refine(&section, 0.004), 64)
 }
