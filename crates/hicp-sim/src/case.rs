@@ -210,12 +210,6 @@ impl CaseMaker {
         })
     }
 
-    /// Returns the configuration.
-    #[must_use]
-    pub fn config(&self) -> &CaseConfig {
-        &self.config
-    }
-
     /// Generates a case. With bins, case i has bin i modulo the number of bins.
     ///
     /// The object pose of a case is the same for every [`InitialPose`], unless all tries around it

@@ -88,24 +88,6 @@ impl TsdfVolume {
         })
     }
 
-    /// Returns the configuration.
-    #[must_use]
-    pub fn config(&self) -> &TsdfConfig {
-        &self.config
-    }
-
-    /// Returns the number of voxels along x, y and z.
-    #[must_use]
-    pub fn size(&self) -> [usize; 3] {
-        self.size
-    }
-
-    /// Returns the number of integrated images.
-    #[must_use]
-    pub fn images(&self) -> u32 {
-        self.images
-    }
-
     /// Integrates a depth image taken at `camera_from_volume`, in meters.
     ///
     /// The ray of a pixel without depth hits nothing, as in the render of a single object.
