@@ -61,9 +61,9 @@ pub use sequential::{
 };
 pub use single::{Condition, Config, Experiment, TABLE_I, claims};
 pub use study::{
-    ALL, CONFIG_FILE, CameraRecord, Design, FAULTY_MASK, Fields, Group, HIGH, LOW, Layout,
-    MAX_BINS, MAX_CELLS, MAX_OBJECTS, Measured, Models, NOISY, NOISY_DEPTH, NOISY_MODEL,
-    ObjectRecord, Outcome, Row, RunOptions, StudyOf, Worker, run,
+    ALL, CONFIG_FILE, Design, FAULTY_MASK, Fields, Group, HIGH, LOW, Layout, MAX_BINS, MAX_CELLS,
+    MAX_OBJECTS, Measured, Models, NOISY, NOISY_DEPTH, NOISY_MODEL, ObjectRecord, Outcome, Row,
+    RunOptions, StudyOf, Worker, run,
 };
 pub use subject::Subject;
 pub use variant::Variant;

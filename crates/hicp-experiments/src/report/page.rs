@@ -219,7 +219,7 @@ impl<D: Reported> Entry<D> {
             rows if rows == expected => rows.to_string(),
             rows => format!("{rows} of {expected}: not finished"),
         };
-        let (width, height, fx) = (layout.camera.width, layout.camera.height, layout.camera.fx);
+        let ((width, height), fx) = (layout.camera.size(), layout.camera.fx());
         let mut all = vec![
             ("objects", objects.join(", ")),
             ("rows", rows),

@@ -1,5 +1,6 @@
 //! The configuration of a sequential study, stored next to its rows.
 
+use hicp_core::PinholeCamera;
 use hicp_sim::{DepthNoise, Reconstruction, ReconstructionNoise, VsdBins, WrongPose};
 use hybrid_icp::{Preset, WithoutPairs};
 use serde::{Deserialize, Serialize};
@@ -7,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::rule::{FusionRule, PlainCovariance};
 use crate::error::ExperimentError;
 use crate::single::TABLE_I;
-use crate::study::{CameraRecord, Design, Fields, ObjectRecord};
+use crate::study::{Design, Fields, ObjectRecord, camera};
 use crate::subject::Subject;
 use crate::variant::Variant;
 
@@ -73,7 +74,7 @@ pub struct TrajectoryConfig {
     /// Largest distance of the object from the cameras of a reconstruction, meters.
     pub reconstruction_max_distance_m: f64,
     /// The camera.
-    pub camera: CameraRecord,
+    pub camera: PinholeCamera,
     /// The pipelines that compute the estimates.
     pub underlying: Vec<UnderlyingRecord>,
     /// The methods that fuse them.
@@ -183,7 +184,7 @@ impl TrajectoryConfig {
             reconstruction_voxel_m: 0.0025,
             reconstruction_truncation_m: None,
             reconstruction_max_distance_m: 0.6,
-            camera: CameraRecord::default(),
+            camera: camera()?,
             underlying: underlying.iter().map(UnderlyingRecord::from).collect(),
             methods: FusionRule::ALL.map(FusionRule::name).to_vec(),
             objects: subjects.iter().map(ObjectRecord::from).collect(),
@@ -252,7 +253,7 @@ impl TrajectoryConfig {
         text.parse().unwrap_or_default()
     }
 
-    pub(super) fn reconstruction(&self) -> Result<Reconstruction, ExperimentError> {
+    pub(super) fn reconstruction(&self) -> Reconstruction {
         let noise = ReconstructionNoise {
             depth: Self::noise(&self.reconstruction_depth_noise),
             translation_meters: self.reconstruction_translation_m,
@@ -260,14 +261,14 @@ impl TrajectoryConfig {
             wrong_pose: self.reconstruction_wrong_pose,
             ..ReconstructionNoise::default()
         };
-        Ok(Reconstruction {
+        Reconstruction {
             images: self.reconstruction_images,
             max_distance_meters: self.reconstruction_max_distance_m,
             axis_offset_meters: self.axis_offset_m,
             voxel_meters: self.reconstruction_voxel_m,
             truncation_meters: self.reconstruction_truncation_m,
-            ..Reconstruction::new(self.camera.pinhole()?, noise)
-        })
+            ..Reconstruction::new(self.camera, noise)
+        }
     }
 }
 

@@ -78,7 +78,7 @@ impl Design for TrajectoryConfig {
     fn layout(&self) -> Layout<'_> {
         Layout {
             seed: self.seed,
-            camera: &self.camera,
+            camera: self.camera,
             objects: &self.objects,
             settings: self.underlying.iter().map(|u| u.name.as_str()).collect(),
             variants: self.methods.iter().map(String::as_str).collect(),

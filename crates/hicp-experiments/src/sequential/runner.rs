@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::ops::Range;
 
-use hicp_core::{DepthImage, Isometry3, Mask, Matrix6, Model, Observation, PinholeCamera};
+use hicp_core::{DepthImage, Isometry3, Mask, Matrix6, Model, Observation};
 use hicp_sim::{CaseConfig, CaseMaker, InitialPose, stream};
 use hybrid_icp::fusion::{CameraMotion, PoseEstimate};
 use hybrid_icp::raster::render_depth_image;
@@ -27,7 +27,6 @@ pub(super) struct TrajectoryRunner<'a> {
     config: &'a TrajectoryConfig,
     subjects: &'a [Subject],
     models: &'a Models,
-    camera: PinholeCamera,
     scorer: CaseMaker,
     underlying: Vec<Variant>,
     rules: Vec<FusionRule>,
@@ -82,7 +81,6 @@ impl<'a> TrajectoryRunner<'a> {
         subjects: &'a [Subject],
         models: &'a Models,
     ) -> Result<Self, ExperimentError> {
-        let camera = config.camera.pinhole()?;
         let underlying: Vec<Variant> = config.underlying.iter().map(|u| u.variant()).collect();
         for variant in &underlying {
             variant.build(None)?;
@@ -94,8 +92,7 @@ impl<'a> TrajectoryRunner<'a> {
             config,
             subjects,
             models,
-            camera,
-            scorer: CaseMaker::new(CaseConfig::new(camera, InitialPose::mean_error()))?,
+            scorer: CaseMaker::new(CaseConfig::new(config.camera, InitialPose::mean_error()))?,
             rules: rules.collect(),
             underlying,
         })
@@ -133,10 +130,12 @@ impl<'a> TrajectoryRunner<'a> {
     fn draw(&mut self, object: usize, index: u64) -> Result<(Trajectory, &'a Model), String> {
         let (config, subject) = (self.config, &self.subjects[object]);
         let (model, name) = (&subject.model, &subject.name);
-        let believed = self.models.get(object, 0, || {
-            let settings = config.reconstruction()?;
-            Ok(settings.reconstruct(model, name, config.seed)?)
-        })?;
+        let reconstruct = || {
+            Ok(config
+                .reconstruction()
+                .reconstruct(model, name, config.seed)?)
+        };
+        let believed = self.models.get(object, 0, reconstruct)?;
         let trajectory = Trajectory::draw(config, &mut self.scorer, model, name, index)?;
         Ok((trajectory, believed))
     }
@@ -196,7 +195,7 @@ impl<'a> TrajectoryRunner<'a> {
             truth = motion.apply(&truth);
             let (depth, mask) = self.take_image(journey, image, &truth)?;
             let start = thread_time();
-            let observation = Observation::new(depth, mask, self.camera)?;
+            let observation = Observation::new(depth, mask, config.camera)?;
             let mut end = start;
             for one in &mut *group {
                 let step = one.estimator.step(journey.believed, &observation, &motion);
@@ -237,7 +236,7 @@ impl<'a> TrajectoryRunner<'a> {
         truth: &Isometry3<f64>,
     ) -> Result<(DepthImage, Mask), Failed> {
         let subject = &self.subjects[journey.object];
-        let depth = render_depth_image(subject.model.mesh(), &self.camera, truth);
+        let depth = render_depth_image(subject.model.mesh(), &self.config.camera, truth);
         let mask = Mask::measured(&depth);
         let underlying = &self.underlying[journey.underlying].name;
         let labels = [&subject.name, underlying, "trajectory sensor"];

@@ -1,6 +1,6 @@
 //! The configuration of a study of single images, stored next to its rows.
 
-use hicp_core::NormalWindow;
+use hicp_core::{NormalWindow, PinholeCamera};
 use hicp_sim::{
     CaseConfig, InitialPose, MEAN_ROTATION_ERROR_DEGREES, MEAN_TRANSLATION_ERROR_METERS, VsdBins,
 };
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::experiment::Experiment;
 use crate::error::ExperimentError;
-use crate::study::{CameraRecord, Design, Fields, ObjectRecord};
+use crate::study::{Design, Fields, ObjectRecord, camera};
 use crate::subject::Subject;
 use crate::variant::Variant;
 
@@ -43,7 +43,7 @@ pub struct Config {
     #[serde(default)]
     pub normal_window: Option<u8>,
     /// The camera.
-    pub camera: CameraRecord,
+    pub camera: PinholeCamera,
     /// The levels.
     pub levels: Vec<String>,
     /// The pipelines.
@@ -81,7 +81,7 @@ impl Config {
             max_distance_m: 0.6,
             axis_offset_m: 0.02,
             normal_window: None,
-            camera: CameraRecord::default(),
+            camera: camera()?,
             levels: experiment.levels(),
             variants: variants.to_vec(),
             objects: subjects.iter().map(ObjectRecord::from).collect(),
@@ -99,7 +99,7 @@ impl Config {
     }
 
     /// Returns the configuration of the cases, with binned or with fixed initial poses.
-    pub(super) fn cases(&self, binned: bool) -> Result<CaseConfig, ExperimentError> {
+    pub(super) fn cases(&self, binned: bool) -> CaseConfig {
         let init = match binned {
             true => InitialPose::Binned(VsdBins {
                 count: self.bins,
@@ -111,10 +111,10 @@ impl Config {
                 rotation_degrees: self.rotation_deg,
             },
         };
-        Ok(CaseConfig {
+        CaseConfig {
             max_distance_meters: self.max_distance_m,
             axis_offset_meters: self.axis_offset_m,
-            ..CaseConfig::new(self.camera.pinhole()?, init)
-        })
+            ..CaseConfig::new(self.camera, init)
+        }
     }
 }

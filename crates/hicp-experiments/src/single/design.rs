@@ -47,7 +47,7 @@ impl Design for Config {
         let is_binned = levels.map(|level| self.experiment.condition(level, 0).binned);
         Layout {
             seed: self.seed,
-            camera: &self.camera,
+            camera: self.camera,
             objects: &self.objects,
             settings: self.levels.iter().map(String::as_str).collect(),
             variants: self.variants.iter().map(|v| v.name.as_str()).collect(),

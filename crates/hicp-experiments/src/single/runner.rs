@@ -57,7 +57,7 @@ impl<'a> Runner<'a> {
         subjects: &'a [Subject],
         models: &'a Models,
     ) -> Result<Self, ExperimentError> {
-        let maker = |binned| Ok::<_, ExperimentError>(CaseMaker::new(config.cases(binned)?)?);
+        let maker = |binned| CaseMaker::new(config.cases(binned));
         let build = |alpha| config.variants.iter().map(|v| v.build(alpha)).collect();
         let alphas = config.experiment.alphas(config.levels.len()).into_iter();
         let workspace = |_| Workspace::new(Rasterizer::default());
@@ -116,7 +116,7 @@ impl<'a> Runner<'a> {
             let settings = Reconstruction {
                 max_distance_meters: config.max_distance_m,
                 axis_offset_meters: config.axis_offset_m,
-                ..Reconstruction::new(config.camera.pinhole()?, ReconstructionNoise::level(level)?)
+                ..Reconstruction::new(config.camera, ReconstructionNoise::level(level)?)
             };
             Ok(settings.reconstruct(&subject.model, &subject.name, config.seed)?)
         })

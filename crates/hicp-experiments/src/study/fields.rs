@@ -108,16 +108,11 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Checks the fields of every configuration: camera, objects, bins and the size of the
-    /// analysis.
+    /// Checks the fields of every configuration: objects, bins and the size of the analysis.
     ///
     /// Objects must be smaller than `distance`, which is that from the camera in meters. `names`
     /// are the fields that list the settings and the variants.
     pub(crate) fn common(&self, layout: &Layout<'_>, distance: f64, names: [&str; 2]) -> Checked {
-        if let Err(error) = layout.camera.pinhole() {
-            let found = format_args!("invalid numbers ({error})");
-            self.require(false, "camera", found, "a camera")?;
-        }
         self.names("objects", MAX_OBJECTS)?;
         for (index, object) in layout.objects.iter().enumerate() {
             let field = format_args!("objects[{index}].diameter_mm");

@@ -1,6 +1,8 @@
 //! The rows of a configuration, and the order in which a run writes them.
 
-use super::records::{CameraRecord, ObjectRecord};
+use hicp_core::PinholeCamera;
+
+use super::records::ObjectRecord;
 use super::row::{Outcome, Row};
 
 /// The objects, settings and variants of a study, and its number of cases.
@@ -11,7 +13,7 @@ pub struct Layout<'a> {
     /// Seed of all random numbers.
     pub seed: u64,
     /// The camera.
-    pub camera: &'a CameraRecord,
+    pub camera: PinholeCamera,
     /// The objects.
     pub objects: &'a [ObjectRecord],
     /// Names of the settings.

@@ -5,19 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::subject::Subject;
 
-/// A camera in a configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the names of every camera file")]
-pub struct CameraRecord {
-    pub fx: f64,
-    pub fy: f64,
-    pub cx: f64,
-    pub cy: f64,
-    pub width: u32,
-    pub height: u32,
-}
-
 /// An object in a configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,25 +23,10 @@ pub struct ObjectRecord {
     pub fingerprint: String,
 }
 
-impl Default for CameraRecord {
-    /// The camera of the studies: 640 × 480 pixels with a focal length of 573 pixels.
-    fn default() -> Self {
-        Self {
-            // Open: camera: §VI-A. That of the LINEMOD dataset, pixels.
-            fx: 572.4,
-            fy: 573.6,
-            cx: 325.3,
-            cy: 242.0,
-            width: 640,
-            height: 480,
-        }
-    }
-}
-
-impl CameraRecord {
-    pub(crate) fn pinhole(&self) -> Result<PinholeCamera, CameraError> {
-        PinholeCamera::new(self.fx, self.fy, self.cx, self.cy, self.width, self.height)
-    }
+/// Returns the camera of the studies: 640 × 480 pixels with a focal length of 573 pixels.
+pub(crate) fn camera() -> Result<PinholeCamera, CameraError> {
+    // Open: camera: §VI-A. That of the LINEMOD dataset, pixels.
+    PinholeCamera::new(572.4, 573.6, 325.3, 242.0, 640, 480)
 }
 
 impl From<&Subject> for ObjectRecord {

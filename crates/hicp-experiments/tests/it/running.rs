@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use hicp_core::{Model, TriMesh};
+use hicp_core::{Model, PinholeCamera, TriMesh};
 use hicp_experiments::{
     Config, Design, Experiment, ExperimentError, RunOptions, Study, Subject, Variant, run,
 };
@@ -17,9 +17,7 @@ fn config(experiment: Experiment, presets: &[Preset], poses: u64) -> Config {
     let variants: Vec<Variant> = presets.iter().copied().map(Variant::preset).collect();
     let mut config = Config::new(experiment, &subjects(), &variants, poses, 3).unwrap();
     config.times = false;
-    let camera = &mut config.camera;
-    (camera.fx, camera.fy, camera.cx, camera.cy) = (143.0, 143.0, 79.5, 59.5);
-    (camera.width, camera.height) = (160, 120);
+    config.camera = PinholeCamera::new(143.0, 143.0, 79.5, 59.5, 160, 120).unwrap();
     config
 }
 
@@ -206,13 +204,7 @@ fn a_case_that_cannot_be_created_has_a_reason_and_the_others_are_run() {
     let mut config = config(Experiment::InitNoise, &TWO, 2);
     // Every initial pose is the true one, and falls into the first bin.
     config.max_translation_m = 0.0;
-    (config.camera.width, config.camera.height) = (32, 24);
-    (
-        config.camera.fx,
-        config.camera.fy,
-        config.camera.cx,
-        config.camera.cy,
-    ) = (28.0, 28.0, 15.5, 11.5);
+    config.camera = PinholeCamera::new(28.0, 28.0, 15.5, 11.5, 32, 24).unwrap();
     let folder = Folder::with(&config, 2);
     let rows = folder.study::<Config>().rows;
     assert_eq!(rows.len(), 2 * 2 * 2);

@@ -1,5 +1,6 @@
 //! The sequential study end to end: streaming, resuming, pairing, and any number of threads.
 
+use hicp_core::PinholeCamera;
 use hicp_experiments::{
     Design, FusionRule, Metric, Panel, PathDirection, Row, Subject, TrajectoryClock,
     TrajectoryConfig, TrajectoryReport,
@@ -23,9 +24,7 @@ fn config() -> TrajectoryConfig {
     let mut config = TrajectoryConfig::new(&mug(), &BOTH, 1, 3)
         .unwrap()
         .improved();
-    let camera = &mut config.camera;
-    (camera.fx, camera.fy, camera.cx, camera.cy) = (143.0, 143.0, 79.5, 59.5);
-    (camera.width, camera.height) = (160, 120);
+    config.camera = PinholeCamera::new(143.0, 143.0, 79.5, 59.5, 160, 120).unwrap();
     config.start_distance_m = 0.6;
     config.path_m = 0.12;
     config.underlying[1].seconds_per_estimate = 0.4;

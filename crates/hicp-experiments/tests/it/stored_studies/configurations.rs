@@ -55,8 +55,6 @@ fn fields_of_a_configuration_are_checked() {
             "at least 0",
         ),
         ("/max_distance_m", json!(0.0), "max_distance_m", "above 0"),
-        ("/camera/fx", json!(0.0), "camera", "a camera"),
-        ("/camera/width", json!(u32::MAX), "camera", "a camera"),
     ] {
         let outcome = stored.with(pointer, value);
         assert_eq!(outcome.0, field);
@@ -143,7 +141,6 @@ fn fields_of_a_sequential_configuration_are_checked() {
         ),
         ("/speed_m_s", json!(0.0), "speed_m_s", "above 0"),
         ("/path_m", json!(-1.0), "path_m", "at least 0"),
-        ("/camera/fy", json!(-1.0), "camera", "a camera"),
     ] {
         let outcome = stored.with(pointer, value);
         assert_eq!(outcome.0, field);
@@ -240,5 +237,20 @@ fn ranges_of_bins_have_fixed_limits_of_the_initial_vsd() {
         let figures = Report::of(vec![("it".to_owned(), study)]).figures();
         let points = &figures[0].1.rows[0][0].curves[0].points;
         assert!((points[0].0 - 0.5 / bins as f64).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn numbers_that_are_not_a_camera_are_refused_by_name() {
+    for stored in [Stored::single(), Stored::sequential()] {
+        for (pointer, value, name) in [
+            ("/camera/fx", json!(0.0), "fx is 0"),
+            ("/camera/fy", json!(-1.0), "fy is -1"),
+            ("/camera/width", json!(u32::MAX), "width is 4294967295"),
+        ] {
+            let error = stored.error_with(pointer, value);
+            assert!(error.found.contains(name), "{error}");
+            assert_eq!(error.expected, "the configuration of a study");
+        }
     }
 }

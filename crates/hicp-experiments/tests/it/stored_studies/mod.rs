@@ -96,6 +96,16 @@ impl Stored {
     /// Returns field, found value and expectation of the error.
     #[track_caller]
     fn with(&self, pointer: &str, value: Value) -> (String, String, String) {
+        let error = self.error_with(pointer, value);
+        let Some(Place::Field(field)) = error.place else {
+            panic!("{pointer}: {error:?}");
+        };
+        (field, error.found, error.expected)
+    }
+
+    /// Changes a value of the configuration, restores the file, and returns the error.
+    #[track_caller]
+    fn error_with(&self, pointer: &str, value: Value) -> IoError {
         let before = self.text(CONFIG_FILE);
         let mut config: Value = serde_json::from_str(&before).unwrap();
         *config.pointer_mut(pointer).unwrap() = value;
@@ -104,10 +114,7 @@ impl Stored {
         self.write(CONFIG_FILE, before);
         let error = content_error(outcome);
         assert_eq!(error.path, self.path(CONFIG_FILE));
-        let Some(Place::Field(field)) = error.place else {
-            panic!("{pointer}: {error:?}");
-        };
-        (field, error.found, error.expected)
+        error
     }
 
     /// Changes the rows, asserts the line and a part of the error, and restores the file.
