@@ -261,13 +261,13 @@ fn courses() -> [Course; 9] {
         let half_turn = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);
         *estimate = with_mve(half_turn * center, *estimate.covariance(), 0.1);
     }
-    let certain = |_| Matrix6::zeros();
-    let ignorant = |_| Matrix6::identity() * 1e30;
-    let either = |k: u32| Matrix6::identity() * [0.0, 1e30][k as usize % 2];
-    let directions = |k: u32| {
+    let certain = scattered(0.01, &|_| Matrix6::zeros());
+    let ignorant = scattered(0.01, &|_| Matrix6::identity() * 1e30);
+    let either = scattered(0.01, &|k| Matrix6::identity() * [0.0, 1e30][k as usize % 2]);
+    let directions = scattered(0.01, &|k| {
         let variance = |i: usize| if i % 2 == k as usize % 2 { 0.0 } else { 1e12 };
         Matrix6::from_diagonal(&Vector6::from_fn(|i, _| variance(i)))
-    };
+    });
     let near = scattered(0.002, &sized(1e-5));
     let apart = scattered(0.02, &sized(1e-3));
     [
@@ -276,26 +276,10 @@ fn courses() -> [Course; 9] {
         ("estimates far apart", scattered(0.4, &sized(0.1)), false),
         ("estimates rotated by 180°", turns, false),
         ("one wild outlier", wild, false),
-        (
-            "estimates without variance",
-            scattered(0.01, &certain),
-            false,
-        ),
-        (
-            "estimates without information",
-            scattered(0.01, &ignorant),
-            false,
-        ),
-        (
-            "estimates with all information or none",
-            scattered(0.01, &either),
-            false,
-        ),
-        (
-            "estimates of some directions only",
-            scattered(0.01, &directions),
-            false,
-        ),
+        ("estimates without variance", certain, false),
+        ("estimates without information", ignorant, false),
+        ("estimates with all information or none", either, false),
+        ("estimates of some directions only", directions, false),
     ]
     .map(|(name, estimates, tame)| Course {
         name,

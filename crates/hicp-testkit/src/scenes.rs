@@ -133,36 +133,21 @@ pub(crate) fn cases() -> Vec<Case> {
 }
 
 fn poses(scene: &Scene) -> [(&'static str, Isometry3<f64>); 10] {
-    let moved = |translation: Vector3<f64>| {
-        Isometry3::from_parts(Translation3::from(translation), scene.truth.rotation)
-    };
-    let t = scene.truth.translation.vector;
+    let moved = |x, y, z| Isometry3::from_parts(Translation3::new(x, y, z), scene.truth.rotation);
+    let turned = Vector3::new(f64::NAN, 0.0, 0.0);
+    let turned = Isometry3::from_parts(scene.truth.translation, UnitQuaternion::new(turned));
+    let [x, y, z] = scene.truth.translation.vector.into();
     [
         ("the true pose", scene.truth),
         ("a pose nearly right", scene.near),
         ("a pose far off", scene.far),
-        ("a pose behind the camera", moved(-t)),
-        ("a pose outside the image", moved(t + Vector3::x() * 5.0)),
-        ("a pose around the camera", moved(Vector3::zeros())),
-        (
-            "a distance beyond the range of f32",
-            moved(Vector3::new(t.x, t.y, 1e300)),
-        ),
-        (
-            "a translation of NaN",
-            moved(Vector3::new(t.x, f64::NAN, t.z)),
-        ),
-        (
-            "an infinite translation",
-            moved(Vector3::new(t.x, t.y, f64::INFINITY)),
-        ),
-        (
-            "a rotation of NaN",
-            Isometry3::from_parts(
-                scene.truth.translation,
-                UnitQuaternion::new(Vector3::new(f64::NAN, 0.0, 0.0)),
-            ),
-        ),
+        ("a pose behind the camera", moved(-x, -y, -z)),
+        ("a pose outside the image", moved(x + 5.0, y, z)),
+        ("a pose around the camera", moved(0.0, 0.0, 0.0)),
+        ("a distance beyond the range of f32", moved(x, y, 1e300)),
+        ("a translation of NaN", moved(x, f64::NAN, z)),
+        ("an infinite translation", moved(x, y, f64::INFINITY)),
+        ("a rotation of NaN", turned),
     ]
 }
 
