@@ -1,37 +1,25 @@
 //! `cargo xtask counts`: the work of every preset on a fixed set of scenes, against a blessed file.
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 
-use crate::process::{cargo, output};
-use crate::read;
+use crate::process::{cargo, command, execute, output, target};
 
 const FILE: &str = "benches/counts.txt";
 
 /// Counts again and compares with the file.
 pub(crate) fn check() -> Result<()> {
-    let (blessed, counted) = (read(FILE)?, count()?);
-    let (mut before, mut after) = (blessed.lines(), counted.lines());
-    let header = after.clone().next().unwrap_or_default().to_owned();
-    let mut differences = Vec::new();
-    loop {
-        match (before.next(), after.next()) {
-            (None, None) => break,
-            (before, after) if before == after => {}
-            (before, after) => {
-                differences.extend(before.map(|line| format!("- {line}")));
-                differences.extend(after.map(|line| format!("+ {line}")));
-            }
-        }
-    }
-    if differences.is_empty() {
-        println!("xtask counts: as in {FILE}");
-        return Ok(());
-    }
-    bail!(
-        "the work differs from {FILE}; if this is intended, run `cargo xtask counts --bless` and \
-         give the reason in the commit\n  {header}\n{}",
-        differences.join("\n")
-    );
+    let counted = target().join("counts.txt");
+    std::fs::write(&counted, count()?)?;
+    // The heading of each difference repeats the names of the columns.
+    let mut diff = command("git --no-pager diff --no-index --unified=0 --");
+    execute(diff.arg(FILE).arg(&counted)).with_context(|| {
+        format!(
+            "the work differs from {FILE}; if this is intended, run `cargo xtask counts --bless` \
+             and give the reason in the commit"
+        )
+    })?;
+    println!("xtask counts: as in {FILE}");
+    Ok(())
 }
 
 /// Writes the file.
