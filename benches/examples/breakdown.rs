@@ -138,18 +138,6 @@ impl<T: Minimize> Minimize for Timed<T> {
         timed(METRIC, || self.0.mean_loss(iteration, pairs))
     }
 
-    fn add_squared_errors(
-        &mut self,
-        iteration: &Iteration<'_>,
-        pairs: &Correspondences,
-        factor: f64,
-        errors: &mut [f64],
-    ) {
-        timed(METRIC, || {
-            self.0.add_squared_errors(iteration, pairs, factor, errors);
-        });
-    }
-
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
         timed(METRIC, || self.0.minimize(iteration, pairs))
     }
