@@ -63,15 +63,12 @@ pub enum SimError {
     },
     /// A volume would have too many voxels, or too few along an axis.
     #[error(
-        "the volume has {x}x{y}x{z} voxels, expected at most {limit} voxels and at least 2 along each axis"
+        "the volume has {}x{}x{} voxels, expected at most {limit} voxels and at least 2 along each axis",
+        .size[0], .size[1], .size[2]
     )]
     VolumeSize {
-        /// Voxels along x.
-        x: usize,
-        /// Voxels along y.
-        y: usize,
-        /// Voxels along z.
-        z: usize,
+        /// Voxels along x, y and z.
+        size: [usize; 3],
         /// The largest number of voxels.
         limit: usize,
     },

@@ -48,12 +48,8 @@ impl ScalarGrid {
     pub fn surface(&self) -> Result<TriMesh, SimError> {
         let [nx, ny, nz] = self.size;
         if self.values.len() != nx * ny * nz || self.size.iter().any(|n| *n < 2) {
-            return Err(SimError::VolumeSize {
-                x: nx,
-                y: ny,
-                z: nz,
-                limit: self.values.len(),
-            });
+            let (size, limit) = (self.size, self.values.len());
+            return Err(SimError::VolumeSize { size, limit });
         }
         let table = table();
         let mut surface = Surface {

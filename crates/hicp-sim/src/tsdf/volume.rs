@@ -71,15 +71,9 @@ impl TsdfVolume {
         let count = size
             .iter()
             .try_fold(1_usize, |product, n| product.checked_mul(*n));
-        let Some(count) = count.filter(|count| *count <= MAX_VOXELS) else {
-            let [x, y, z] = size;
-            return Err(SimError::VolumeSize {
-                x,
-                y,
-                z,
-                limit: MAX_VOXELS,
-            });
-        };
+        let limit = MAX_VOXELS;
+        let count = count.filter(|count| *count <= limit);
+        let count = count.ok_or(SimError::VolumeSize { size, limit })?;
         Ok(Self {
             config,
             size,
