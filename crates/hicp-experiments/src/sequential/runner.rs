@@ -148,7 +148,7 @@ impl<'a> TrajectoryRunner<'a> {
         let mut travelers = Vec::new();
         for rule in &self.rules {
             let underlying = (&*variant.name, variant.build(None)?);
-            let init = &journey.trajectory.init;
+            let init = &journey.trajectory.start.init;
             travelers.push(Traveler {
                 estimator: rule.estimator(plain, underlying, journey.believed, init)?,
                 n_estimates: 0,
@@ -167,7 +167,7 @@ impl<'a> TrajectoryRunner<'a> {
                 None => groups.push(vec![one]),
             }
         }
-        let mut truth = journey.trajectory.camera_from_object;
+        let mut truth = journey.trajectory.start.truth;
         for group in &mut groups {
             truth = self.go(journey, group, watch)?;
         }
@@ -188,7 +188,7 @@ impl<'a> TrajectoryRunner<'a> {
         let with_mve = group.first().is_some_and(|one| one.with_mve);
         let last = config.n_images(journey.underlying, with_mve) - 1;
         let seconds = config.seconds(journey.underlying, with_mve);
-        let mut truth = trajectory.camera_from_object;
+        let mut truth = trajectory.start.truth;
         let mut motion = CameraMotion::none();
         let mut traveled = 0.0;
         for image in 0.. {
@@ -254,7 +254,7 @@ impl<'a> TrajectoryRunner<'a> {
         let subject = &self.subjects[journey.object];
         let (model, pose) = (&subject.model, one.estimator.camera_from_object());
         let mut measured = Measured {
-            vsd_initial: journey.trajectory.vsd_initial,
+            vsd_initial: journey.trajectory.start.vsd,
             vsd_final: self.scorer.vsd(model, truth, &pose),
             add_final_mm: subject.add_or_adi_mm(&pose, truth),
             steps: one.n_estimates,

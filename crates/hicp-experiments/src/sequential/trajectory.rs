@@ -1,7 +1,7 @@
 //! The camera's path, and the initial pose (§VI-C.1).
 
 use hicp_core::{Isometry3, Model, Translation3, Vector3};
-use hicp_sim::{CaseMaker, VsdBins, object_pose, stream, unit_vector};
+use hicp_sim::{CaseMaker, Start, VsdBins, object_pose, stream, unit_vector};
 use rand::RngExt;
 
 use super::config::{PathDirection, TrajectoryConfig};
@@ -11,14 +11,10 @@ use super::config::{PathDirection, TrajectoryConfig};
 /// The camera does not rotate.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Trajectory {
-    /// The true pose in the first camera frame.
-    pub(crate) camera_from_object: Isometry3<f64>,
+    /// The true and the initial pose in the first camera frame, with the original model.
+    pub(crate) start: Start,
     /// Direction of the camera's motion, a unit vector in its frame.
     pub(crate) direction: Vector3<f64>,
-    /// The initial pose, in the first camera frame.
-    pub(crate) init: Isometry3<f64>,
-    /// Mean VSD of `init` against the truth in the first camera frame, with the original model.
-    pub(crate) vsd_initial: f64,
 }
 
 impl Trajectory {
@@ -56,18 +52,13 @@ impl Trajectory {
             };
             truth
         });
-        match found {
-            Some(start) => Ok(Self {
-                camera_from_object: start.truth,
-                direction,
-                init: start.init,
-                vsd_initial: start.vsd,
-            }),
-            None => Err(format!(
+        let start = found.ok_or_else(|| {
+            format!(
                 "no start of {object} in bin {bin} of {}, expected one within {} tries around each of {} poses",
                 bins.count, bins.tries_per_pose, bins.max_poses
-            )),
-        }
+            )
+        })?;
+        Ok(Self { start, direction })
     }
 
     /// Returns the motion of the camera over a distance: the next camera frame from the previous
