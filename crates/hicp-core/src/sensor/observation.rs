@@ -394,7 +394,9 @@ impl Observation {
             self.depth.height().div_ceil(factor),
         );
         let fine_width = self.depth.width() as usize;
-        let (mut depth, mut mask) = (Vec::<f32>::new(), Vec::<bool>::new());
+        let n_pixels = width as usize * height as usize;
+        let mut depth: Vec<f32> = Vec::with_capacity(n_pixels);
+        let mut mask: Vec<bool> = Vec::with_capacity(n_pixels);
         for v in (0..self.depth.height() as usize).step_by(step) {
             let row = v * fine_width..(v + 1) * fine_width;
             depth.extend(self.depth.pixels()[row.clone()].iter().step_by(step));

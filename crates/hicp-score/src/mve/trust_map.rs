@@ -60,7 +60,9 @@ impl TrustMap {
         let step = region.width().max(region.height()).div_ceil(SIDE).max(1);
         let width = region.width().div_ceil(step).max(1);
         let (depth, mask) = (observation.depth(), observation.mask());
-        let (mut masked, mut depths) = (Vec::new(), Vec::new());
+        let n_cells = width * region.height().div_ceil(step);
+        let mut masked = Vec::with_capacity(n_cells);
+        let mut depths = Vec::with_capacity(n_cells);
         for columns in rows(&region, depth.width()).step_by(step) {
             masked.extend(mask.pixels()[columns.clone()].iter().step_by(step));
             depths.extend(depth.pixels()[columns].iter().step_by(step));
@@ -113,7 +115,7 @@ impl TrustMap {
         }
         let mut weights = Vec::with_capacity(region.area());
         let mut total = 0;
-        let mut trusted = Vec::new();
+        let mut trusted = Vec::with_capacity(width * step);
         for (row, columns) in rows(&region, depth.width()).enumerate() {
             if row % step == 0 {
                 trusted.clear();
