@@ -27,6 +27,8 @@ pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
 pub(crate) fn kind(value: &Bound<'_, PyAny>) -> String {
     if let Ok(array) = value.cast::<PyUntypedArray>() {
         format!("an array of {}", array.dtype())
+    } else if value.is_none() {
+        "None".to_owned()
     } else {
         let name = value.get_type().name();
         name.map_or_else(|_| "an object".to_owned(), |name| format!("a {name}"))
@@ -99,6 +101,14 @@ pub(crate) fn as_array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<B
     })
 }
 
+/// Returns an image of shape (H, W, 1) as one of shape (H, W).
+pub(crate) fn without_channel<'py>(value: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    match value.cast::<PyUntypedArray>() {
+        Ok(array) if matches!(array.shape(), [_, _, 1]) => value.call_method1("squeeze", (2,)),
+        _ => Ok(value),
+    }
+}
+
 /// Returns the array if it is aligned, and a copy otherwise (for a field of packed records).
 pub(crate) fn aligned<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     match value.cast::<PyUntypedArray>() {
@@ -127,7 +137,7 @@ where
             .zip(lengths)
             .all(|(found, length)| length.is_none_or(|length| length == *found));
     if !fits {
-        let what = if value.cast::<PyUntypedArray>().is_ok() {
+        let what = if value.cast::<PyUntypedArray>().is_ok() || found.is_empty() {
             describe(value)
         } else {
             format!("{} of shape {}", describe(value), shape(found))

@@ -39,6 +39,19 @@ def test_observation_errors_name_the_value(arguments, scale, message):
         hi.Observation(*arguments, scale=scale)
 
 
+@pytest.mark.parametrize("depth", [WALL, WALL.astype(np.float64), (WALL * 1000).astype(np.uint16)])
+def test_a_last_axis_of_length_one_is_dropped(depth):
+    scale = 0.001 if depth.dtype == np.uint16 else None
+    mask = np.zeros((48, 64), np.uint8)
+    mask[10:20, 10:30] = 255
+    flat = hi.Observation(depth, mask, CAMERA, scale=scale)
+    image = hi.Observation(depth[..., None], mask[..., None], CAMERA, scale=scale)
+    assert np.array_equal(image.depth, flat.depth) and np.array_equal(image.mask, flat.mask)
+    assert np.array_equal(hi.DepthImage(depth[..., None], scale=scale).to_numpy(), flat.depth)
+    with pytest.raises(hi.InputError, match=r"shape \(48, 64, 3\)"):
+        hi.Observation(WALL, np.repeat(mask[..., None], 3, axis=2), CAMERA)
+
+
 def test_the_window_of_normals_is_a_setting_that_survives_a_pickle():
     # Two columns of five pixels: the 3 x 3 windows of the four outer pixels have fewer than six.
     strip = np.zeros((48, 64), bool)
@@ -65,6 +78,7 @@ def test_units_are_checked_even_if_few_pixels_were_measured():
     [
         (np.eye(3), r"T_co is an array of float64 with shape \(3, 3\), expected a \(4, 4\) float64 matrix"),
         ("pose", "T_co is a str, expected .*; read_pose reads a file"),
+        (None, "T_co is None, expected"),
         ([[1, 2]], r"T_co is a list of shape \(1, 2\), expected"),
         (np.eye(4) * 2, "last row of a pose is 0 0 0 1"),
         (np.diag([1, 1, -1, 1.0]), "T_co: rotation has determinant -1"),
@@ -135,6 +149,7 @@ def test_masks_that_do_not_fit_the_object_cause_a_warning(scene):
     ("make", "message"),
     [
         (lambda: hi.Model(np.zeros((3, 2)), [[0, 1, 2]]), r"vertices is .* shape \(3, 2\), expected a \(V, 3\) array"),
+        (lambda: hi.Model(np.eye(3), None), "faces is None, expected .* not a point cloud"),
         (lambda: hi.Model(np.eye(3), np.zeros((1, 3))), "faces is an array of float64 .* expected an .F, 3. array of integers"),
         (lambda: hi.Model(np.eye(3), [[0.9, 1.2, 2.7]]), "faces is an array of float64 .* expected an .F, 3. array of integers"),
         (lambda: hi.Model(np.eye(3), [[0, 1, 2]], samples=10**12), "samples is 1000000000000, expected at most 10000000"),

@@ -183,7 +183,7 @@ class DepthImage:
 
     Parameters
     ----------
-    depth : numpy.ndarray, shape (H, W)
+    depth : numpy.ndarray, shape (H, W) or (H, W, 1)
         Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
         more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
         uint16.
@@ -445,11 +445,11 @@ class Observation:
 
     Parameters
     ----------
-    depth : DepthImage or numpy.ndarray, shape (H, W)
+    depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
         Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
         more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
         uint16. A `DepthImage` is shared, not copied.
-    mask : numpy.ndarray of bool or uint8, shape (H, W), or None
+    mask : numpy.ndarray of bool or uint8, shape (H, W) or (H, W, 1), or None
         Nonzero on the object. `None` selects every pixel. Other integers must be 0 and 1, or 0 and
         255.
     camera : Camera
@@ -1157,7 +1157,7 @@ class Tracker:
 
         Parameters
         ----------
-        depth : DepthImage or numpy.ndarray, shape (H, W)
+        depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
             In meters, as for `Observation`, in the size of the camera.
         seconds : float
             Time since the previous image, at most 10. Restart the tracker after a longer pause.
@@ -1337,7 +1337,7 @@ def mask_in_box(depth: DepthImage | _Depth, camera: Camera, bbox: npt.ArrayLike,
 
     Parameters
     ----------
-    depth : DepthImage or numpy.ndarray, shape (H, W)
+    depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
         Meters, or integers with `scale`, as for `Observation`.
     camera : Camera
         A camera for images of this size.

@@ -37,7 +37,7 @@ const GRID: usize = 64;
 ///
 /// Parameters
 /// ----------
-/// depth : numpy.ndarray, shape (H, W)
+/// depth : numpy.ndarray, shape (H, W) or (H, W, 1)
 ///     Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
 ///     more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
 ///     uint16.
@@ -178,7 +178,7 @@ pub(crate) fn shared(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<A
 
 /// Reads a depth image, meters, in one pass.
 fn read(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<DepthImage> {
-    let value = &array::as_array("depth", value)?;
+    let value = &array::without_channel(array::as_array("depth", value)?)?;
     let array = value
         .cast::<PyUntypedArray>()
         .map_err(|_| unexpected("depth", value, EXPECTED_DEPTH))?;
@@ -244,7 +244,7 @@ pub(crate) fn mask(value: Option<&Bound<'_, PyAny>>, depth: &DepthImage) -> PyRe
     let expected = "an (H, W) array of bool or uint8, not zero on the object, or of other integers \
                     that are 0 and 1, or 0 and 255; pass mask > 0.5 for probabilities, mask > 0 for \
                     logits, or mask == N for a label image";
-    let value = &array::as_array("mask", value)?;
+    let value = &array::without_channel(array::as_array("mask", value)?)?;
     let refuse = || unexpected("mask", value, expected);
     let kind = value.cast::<PyUntypedArray>().map_err(|_| refuse())?;
     let kind = kind.dtype().kind();

@@ -455,6 +455,10 @@ fn mesh(
         })
         .collect();
     let expected = "an (F, 3) array of integers";
+    if faces.is_none() {
+        let text = "faces is None, expected an (F, 3) array of integers: a model is a surface, not a point cloud";
+        return Err(InputError::new_err(text));
+    }
     // Without a dtype: with an integer dtype, NumPy would truncate the fractions of a list.
     let numpy = faces.py().import("numpy")?;
     let indices = numpy

@@ -114,7 +114,7 @@ impl PyTracker {
     ///
     /// Parameters
     /// ----------
-    /// depth : DepthImage or numpy.ndarray, shape (H, W)
+    /// depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
     ///     In meters, as for `Observation`, in the size of the camera.
     /// seconds : float
     ///     Time since the previous image, at most 10. Restart the tracker after a longer pause.
