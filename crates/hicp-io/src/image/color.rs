@@ -20,7 +20,7 @@ use crate::number::byte;
 /// # Errors
 ///
 /// As for [`read_depth_png`](crate::read_depth_png), except for the errors about scale and pixel
-/// type. Also if the file has another format.
+/// type. Also if the file has another format, or 16-bit gray pixels, as depth images have.
 pub fn read_color(path: impl AsRef<Path>) -> Result<ColorImage, IoError> {
     ReadLimits::DEFAULT.read_color(path)
 }
@@ -63,6 +63,9 @@ pub(crate) fn decode(
 #[cfg(feature = "tiff")]
 fn of_raster(path: &Path, image: &super::raster::Raster) -> Result<ColorImage, IoError> {
     let bits = image.integer_bits.filter(|_| image.background.is_none());
+    if image.channels == 1 && bits == Some(16) {
+        return Err(depth_pixels(path));
+    }
     let Some(bits) = bits else {
         let expected = "integers of gray, RGB or RGBA";
         return Err(IoError::new(
@@ -81,9 +84,19 @@ fn of_raster(path: &Path, image: &super::raster::Raster) -> Result<ColorImage, I
     image.map_err(|error| IoError::unusable(path, "color image", error))
 }
 
+/// Returns the error for a file whose pixels are those of a depth image.
+fn depth_pixels(path: &Path) -> IoError {
+    let expected = "a color image: depth images have such pixels";
+    IoError::new(path, None, "16-bit gray pixels", expected)
+}
+
 fn decode_png(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<ColorImage, IoError> {
     let transformations = Transformations::EXPAND | Transformations::STRIP_16;
     let image = pixels::decode(limits, path, content, transformations, false)?;
+    // The bit depth and the color type of the header; the decoder has removed the low bytes.
+    if let Some([16, 0]) = content.get(24..26) {
+        return Err(depth_pixels(path));
+    }
     let pixels = image.bytes.chunks_exact(image.color.samples());
     let pixels = match image.color {
         ColorType::Rgb | ColorType::Rgba => pixels.map(|p| [p[0], p[1], p[2]]).collect(),
@@ -140,11 +153,7 @@ mod tests {
         let path = dir.path().join("a.png");
         for (kind, bytes, expected) in [
             ((ColorType::Grayscale, BitDepth::One), vec![0x80], [255; 3]),
-            (
-                (ColorType::Grayscale, BitDepth::Sixteen),
-                vec![7, 9],
-                [7; 3],
-            ),
+            ((ColorType::Rgb, BitDepth::Sixteen), vec![7; 6], [7; 3]),
             (
                 (ColorType::GrayscaleAlpha, BitDepth::Eight),
                 vec![7, 9],

@@ -48,3 +48,15 @@ fn tiff_images_have_the_colors_of_their_samples() {
     assert!(white.pixels().iter().all(|pixel| *pixel == [255; 3]));
     refused(read_color(fixture("depth_f64.tiff")), &["floating-point"]);
 }
+
+#[test]
+fn depth_images_are_not_color_images() {
+    for name in [
+        "depth_pillow_u16.png",
+        "depth_u16.tiff",
+        "depth_u16_big_endian.tiff",
+    ] {
+        let parts = [name, "16-bit gray pixels", "a color image"];
+        refused(read_color(fixture(name)), &parts);
+    }
+}
