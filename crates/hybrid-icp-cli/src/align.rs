@@ -86,8 +86,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         voxel_meters: meters(arguments.voxel),
         neighbors: arguments.neighbors,
     };
-    let read = |path, unit, options: CloudOptions| -> anyhow::Result<_> {
-        let PointCloud { points, normals } = limits().read_cloud(path, unit)?;
+    let mut warnings = Vec::new();
+    let mut read = |path: &PathBuf, unit, options: CloudOptions| -> anyhow::Result<_> {
+        let PointCloud {
+            points,
+            normals,
+            n_skipped,
+        } = limits().read_cloud(path, unit)?;
+        if n_skipped > 0 {
+            warnings.push(format!(
+                "{}: {n_skipped} of {} points were skipped: they are not finite, or have no normal",
+                path.display(),
+                points.len() + n_skipped
+            ));
+        }
         Ok(options.cloud(&points, normals.as_deref())?)
     };
     let (unit, of_source) = (arguments.unit, options.for_source_of(method));
@@ -111,7 +123,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         _ => warning.to_string(),
     };
-    let warnings: Vec<String> = found.warnings.iter().map(in_words).collect();
+    warnings.extend(found.warnings.iter().map(in_words));
     let (pose, termination) = (found.target_from_source(), found.outcome.termination);
     let rows = |m: Matrix6<f64>| [0, 1, 2, 3, 4, 5].map(|i| [0, 1, 2, 3, 4, 5].map(|j| m[(i, j)]));
     let matrix = pose.to_homogeneous();

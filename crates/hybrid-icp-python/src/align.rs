@@ -104,7 +104,7 @@ pub(crate) fn align<'py>(
 /// Returns
 /// -------
 /// points : numpy.ndarray, shape (N, 3), float32
-///     Points, meters.
+///     Points, meters. Those that are not finite are left out.
 /// normals : numpy.ndarray, shape (N, 3), float32, or None
 ///     Their normals, if the file has them.
 ///
@@ -120,7 +120,9 @@ pub(crate) fn read_cloud(
     unit: &str,
 ) -> PyResult<(Matrix<f32>, Option<Matrix<f32>>)> {
     let unit: LengthUnit = unit.parse().map_err(errors::input)?;
-    let PointCloud { points, normals } = py
+    let PointCloud {
+        points, normals, ..
+    } = py
         .detach(|| hicp_io::read_cloud(&path, unit))
         .map_err(errors::file)?;
     let points = points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();

@@ -19,8 +19,11 @@ pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, 
     let points = raw.vertices.iter().map(|p| (p / unit).cast::<f32>());
     // A file has normals for all vertices or for none.
     if raw.normals.iter().all(|n| n.iter().all(|x| x.is_nan())) {
-        let (points, normals) = (points.collect(), None);
-        return Ok(PointCloud { points, normals });
+        return Ok(PointCloud {
+            points: points.collect(),
+            normals: None,
+            n_skipped: 0,
+        });
     }
     let normal = |n: &Vector3<f64>| UnitVector3::try_new(n.cast::<f32>(), 1e-6);
     let normals = raw.normals.iter().map(normal);
@@ -33,8 +36,11 @@ pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, 
         let found = "no vertex with a normal";
         return Err(IoError::new(reading.path, None, found, expected));
     }
-    let normals = Some(normals);
-    Ok(PointCloud { points, normals })
+    Ok(PointCloud {
+        n_skipped: raw.vertices.len() - points.len(),
+        points,
+        normals: Some(normals),
+    })
 }
 
 /// Writes a point cloud as binary little-endian PLY, in meters.

@@ -13,6 +13,9 @@ pub struct PointCloud {
     pub points: Vec<Point3<f32>>,
     /// One unit normal per point, or none at all.
     pub normals: Option<Vec<UnitVector3<f32>>>,
+    /// Number of points of the file that were skipped: they are not finite, or have no normal in a
+    /// file with normals.
+    pub n_skipped: usize,
 }
 
 /// The points of a file that is being parsed.
@@ -21,6 +24,7 @@ pub(super) struct Points<'a> {
     points: Vec<Point3<f32>>,
     normals: Vec<UnitVector3<f32>>,
     with_normals: bool,
+    n_skipped: usize,
 }
 
 impl<'a> Points<'a> {
@@ -30,6 +34,7 @@ impl<'a> Points<'a> {
             points: Vec::new(),
             normals: Vec::new(),
             with_normals,
+            n_skipped: 0,
         }
     }
 
@@ -41,13 +46,17 @@ impl<'a> Points<'a> {
         let [x, y, z, nx, ny, nz] = *values;
         let used = if self.with_normals { 6 } else { 3 };
         if !values[..used].iter().all(|value| value.is_finite()) {
+            self.n_skipped += 1;
             return Ok(());
         }
         if self.with_normals {
             let normal = Vector3::new(nx, ny, nz).cast::<f32>();
             match UnitVector3::try_new(normal, 1e-6) {
                 Some(normal) => self.normals.push(normal),
-                None => return Ok(()),
+                None => {
+                    self.n_skipped += 1;
+                    return Ok(());
+                }
             }
         }
         self.reading.check_position(place.clone(), &[x, y, z])?;
@@ -65,6 +74,7 @@ impl<'a> Points<'a> {
         Ok(PointCloud {
             points: self.points,
             normals: self.with_normals.then_some(self.normals),
+            n_skipped: self.n_skipped,
         })
     }
 }

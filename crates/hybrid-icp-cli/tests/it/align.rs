@@ -47,6 +47,20 @@ fn two_clouds_are_registered_and_the_result_is_an_initial_pose() {
 }
 
 #[test]
+fn points_that_are_not_finite_are_counted() {
+    let folder = Folder::new();
+    write_clouds(&folder, &Isometry3::identity());
+    let cloud = "0 0 0\n0.1 0 0\nnan 0 0\n0 0.1 0\n0 0 0.1\n0.1 0.1 0.1\n";
+    folder.write("c.xyz", cloud);
+    let run_ = folder.command("align c.xyz b.pcd").exits(0);
+    assert_contains(
+        &run_.err,
+        &["c.xyz: 1 of 6 points were skipped: they are not finite"],
+    );
+    assert_contains(&run_.json()["warnings"][0].to_string(), &["c.xyz: 1 of 6"]);
+}
+
+#[test]
 fn clouds_that_do_not_overlap_are_warned_of() {
     let folder = Folder::new();
     write_clouds(&folder, &Isometry3::translation(5.0, 0.0, 0.0));

@@ -1502,7 +1502,7 @@ def read_cloud(path: _Path, unit: _Unit='m') -> tuple[npt.NDArray[np.float32], n
     Returns
     -------
     points : numpy.ndarray, shape (N, 3), float32
-        Points, meters.
+        Points, meters. Those that are not finite are left out.
     normals : numpy.ndarray, shape (N, 3), float32, or None
         Their normals, if the file has them.
 
