@@ -205,7 +205,8 @@ pub enum CenterFault {
     Exchanged,
     /// The intrinsics are those of an image of another size.
     ///
-    /// An image that was cropped to its left upper part looks the same.
+    /// An image that was cropped to its left upper part looks the same, unless the mask has the
+    /// length of the object.
     #[error(
         "is the middle of an image {factor:.2} times as large: if the image was resized, resize fx, fy, cx and cy with it"
     )]

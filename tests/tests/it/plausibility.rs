@@ -101,6 +101,30 @@ fn intrinsics_of_another_image_cause_a_warning() {
     }
 }
 
+/// A crop to the left upper half has the intrinsics of an image of twice the size.
+#[test]
+fn a_mask_of_the_length_of_the_object_tells_a_crop_from_a_resized_image() {
+    let model = Model::new(cuboid([0.1, 0.06, 0.04]));
+    let found = |length: u32| {
+        let camera = PinholeCamera::new(300.0, 300.0, 159.5, 119.5, 160, 120).unwrap();
+        let depth = DepthImage::from_meters(160, 120, vec![0.5; 160 * 120]).unwrap();
+        let inside =
+            |i: u32| (40..40 + length).contains(&(i % 160)) && (40..70).contains(&(i / 160));
+        let mask = Mask::new(160, 120, (0..160 * 120).map(inside).collect()).unwrap();
+        let observation = Observation::new(depth, mask, camera).unwrap();
+        warnings(&model, &observation, &Isometry3::translation(0.0, 0.0, 0.5))
+    };
+    // The object has a diameter of 74 pixels.
+    assert_eq!(found(60), []);
+    assert!(matches!(
+        found(30)[..],
+        [Warning::Center {
+            fault: CenterFault::Resized { factor: 2.0 },
+            ..
+        }]
+    ));
+}
+
 #[test]
 fn a_pose_that_is_not_rigid_causes_a_warning() {
     let model = Model::new(cuboid([0.1, 0.06, 0.04]));
