@@ -342,6 +342,24 @@ fn warning_of_center(camera: &PinholeCamera) -> Option<Warning> {
     fault.map(|fault| Warning::Center { cx, cy, fault })
 }
 
+/// Returns whether a box has pixels of an image, as [`mask_in_box`](crate::mask_in_box) rounds it.
+///
+/// The box is x and y of its corner, width and height; the size of the image is width and height,
+/// in pixels. A box of less than a pixel has none.
+///
+/// ```
+/// use hybrid_icp::box_overlaps;
+/// assert!(box_overlaps([-20.0, 470.0, 30.0, 30.0], (640, 480)));
+/// assert!(!box_overlaps([640.0, 10.0, 30.0, 30.0], (640, 480)));
+/// ```
+#[must_use]
+pub fn box_overlaps([x, y, w, h]: [f64; 4], (width, height): (u32, u32)) -> bool {
+    let overlaps = |start: f64, length: f64, side: u32| {
+        length >= 1.0 && start.round() < f64::from(side) && (start + length).round() > 0.0
+    };
+    overlaps(x, w, width) && overlaps(y, h, height)
+}
+
 /// Returns [`Warning::Box`] if a box ends outside of an image, as one of two corners often does.
 ///
 /// The box is x and y of its corner, width and height, as for [`mask_in_box`](crate::mask_in_box);
@@ -365,6 +383,17 @@ pub fn warning_of_box([x, y, w, h]: [f64; 4], (width, height): (u32, u32)) -> Op
     })
 }
 
+/// Returns whether the mask is as long as the model at a depth, so that the focal length is right.
+///
+/// The image was then cropped, and not resized by `factor`.
+fn fits_mask(model: &Model, observation: &Observation, depth: f64, factor: f64) -> bool {
+    let (camera, region) = (observation.camera(), observation.region());
+    let across = region.width() as f64 / camera.fx();
+    let down = region.height() as f64 / camera.fy();
+    let length = across.max(down) * depth / model.diameter();
+    length > RESIZED_LENGTH / factor && length < LONGEST && !touches_border(observation)
+}
+
 /// Returns whether the mask may continue beyond the image.
 fn touches_border(observation: &Observation) -> bool {
     let (camera, region) = (observation.camera(), observation.region());
@@ -383,17 +412,6 @@ fn inside_mask(observation: &Observation) -> (usize, Option<f64>) {
     let mut inside: Vec<f32> = Vec::new();
     for v in region.v_min as usize..region.v_max as usize {
         let row = v * width + columns.start..v * width + columns.end;
-/// Returns whether the mask is as long as the model at a depth, so that the focal length is right.
-///
-/// The image was then cropped, and not resized by `factor`.
-fn fits_mask(model: &Model, observation: &Observation, depth: f64, factor: f64) -> bool {
-    let (camera, region) = (observation.camera(), observation.region());
-    let across = region.width() as f64 / camera.fx();
-    let down = region.height() as f64 / camera.fy();
-    let length = across.max(down) * depth / model.diameter();
-    length > RESIZED_LENGTH / factor && length < LONGEST && !touches_border(observation)
-}
-
         let depth = &observation.depth().pixels()[row.clone()];
         let mask = &observation.mask().pixels()[row];
         for (z, _) in depth.iter().zip(mask).filter(|(_, set)| **set) {

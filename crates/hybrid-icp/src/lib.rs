@@ -105,8 +105,9 @@ pub use align::{
 pub use batch::refine_batch;
 pub use calibration::Calibration;
 pub use checks::{
-    ACCEPTED, EXPLAINS_NOTHING, warning_of_box, warning_of_diameter, warning_of_distance,
-    warning_of_runner_up, warnings, warnings_of_image, warnings_of_model, warnings_of_result,
+    ACCEPTED, EXPLAINS_NOTHING, box_overlaps, warning_of_box, warning_of_diameter,
+    warning_of_distance, warning_of_runner_up, warnings, warnings_of_image, warnings_of_model,
+    warnings_of_result,
 };
 pub use diagnosis::{Diagnosis, Fault, Finding};
 pub use hicp_icp::BoxedStage;

@@ -7,7 +7,7 @@ use clap::error::ErrorKind;
 use clap::{ArgGroup, Args};
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
 use hybrid_icp::core::{ColorImage, DepthImage, Mask, Model, Observation, PinholeCamera};
-use hybrid_icp::{mask_in_box, warning_of_box};
+use hybrid_icp::{box_overlaps, mask_in_box, warning_of_box};
 
 use super::colors;
 use crate::limits::limits;
@@ -282,12 +282,8 @@ impl Inputs {
                 (Some(mask), [0.0; 4])
             }
             Region::Box(bbox) => {
-                let [x, y, width, height] = *bbox;
-                let (w, h) = (f64::from(depth_size.0), f64::from(depth_size.1));
-                let inside = |start: f64, length: f64, side: f64| {
-                    start.round() < side && (start + length).round() > 0.0
-                };
-                if !inside(x, width, w) || !inside(y, height, h) {
+                let ([x, y, width, height], (w, h)) = (*bbox, depth_size);
+                if !box_overlaps(*bbox, depth_size) {
                     bail!(
                         "--bbox {x},{y},{width},{height}: the box is outside of the {w}x{h} image {}, expected x,y,width,height in its pixels",
                         files.depth.display()

@@ -91,17 +91,16 @@ pub(crate) fn mask_in_box(
     check_size(&camera, depth, &image)?;
     let expected = "four numbers: x, y, width and height of a box in the image, pixels";
     let bbox = array::numbers::<f64>(bbox, &[Some(4)], "bbox", expected)?.0;
-    let [x, y, w, h] = [bbox[0], bbox[1], bbox[2], bbox[3]];
-    let (right, low) = (f64::from(camera.width()), f64::from(camera.height()));
-    let has_pixels = w >= 1.0 && h >= 1.0 && x + w > 0.0 && y + h > 0.0 && x < right && y < low;
-    if !has_pixels {
-        let found = format!("bbox is ({x}, {y}, {w}, {h}) in a {right}x{low} image");
+    let bbox @ [x, y, w, h] = [bbox[0], bbox[1], bbox[2], bbox[3]];
+    let (width, height) = camera.size();
+    if !hybrid_icp::box_overlaps(bbox, (width, height)) {
+        let found = format!("bbox is ({x}, {y}, {w}, {h}) in a {width}x{height} image");
         return Err(InputError::new_err(format!("{found}, expected {expected}")));
     }
-    if let Some(warning) = hybrid_icp::warning_of_box([x, y, w, h], camera.size()) {
+    if let Some(warning) = hybrid_icp::warning_of_box(bbox, camera.size()) {
         errors::warn(py, &format!("bbox ({x}, {y}, {w}, {h}): {warning}"))?;
     }
-    let mask = py.detach(|| hybrid_icp::mask_in_box(&image, &camera, [x, y, w, h]));
+    let mask = py.detach(|| hybrid_icp::mask_in_box(&image, &camera, bbox));
     Ok(depth::image(mask.width(), mask.pixels()))
 }
 
