@@ -12,7 +12,7 @@ use serde_json::json;
 
 use crate::limits::limits;
 use crate::options::positive;
-use crate::outputs::Files;
+use crate::outputs::{Files, write_json};
 use crate::pose_json::add_pose;
 use crate::terminal::{check_stdout, say, warn};
 
@@ -145,11 +145,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     });
     add_pose(&mut report, &pose);
     warnings.iter().for_each(warn);
-    let json = serde_json::to_string_pretty(&report)?;
     let Some(path) = output else {
-        return say(json);
+        return say(serde_json::to_string_pretty(&report)?);
     };
-    hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
+    write_json(path, &report)?;
     let fit = match found.rmse() {
         Some(rmse) => format!("fitness {:.3}, RMSE {rmse:.3e} m", found.fitness()),
         None => "no pairs".to_owned(),

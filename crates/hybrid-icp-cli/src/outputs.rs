@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{Context as _, bail};
 use hicp_picture::Picture;
+use serde::Serialize;
 
 /// Checks that pictures have the name of a PNG file, which they are.
 pub(crate) fn check_png<'a>(
@@ -26,6 +27,13 @@ pub(crate) fn check_png<'a>(
 /// Writes a picture as PNG.
 pub(crate) fn write_picture(path: &Path, picture: &Picture) -> Result<(), hicp_io::IoError> {
     hicp_io::write_rgb_png(path, picture.width, picture.height, &picture.rgb)
+}
+
+/// Writes a value as indented JSON.
+pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
+    let json = serde_json::to_string_pretty(value).context("cannot write JSON")?;
+    hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
+    Ok(())
 }
 
 /// The files that a command reads and writes, with the options that name them.

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::inputs::{Inputs, Read, RefineFiles, Region};
 use super::warnings::about_inputs;
 use crate::limits::limits;
-use crate::outputs::Files;
+use crate::outputs::{Files, write_json};
 use crate::terminal::{check_stdout, say, warn};
 
 /// Name what is wrong with the inputs of a refinement, and the fix.
@@ -149,10 +149,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "score": diagnosis.score,
         "warnings": warnings,
     });
-    let json = serde_json::to_string_pretty(&json)?;
     match &arguments.output {
-        Some(path) => hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?,
-        None if arguments.json => return say(json),
+        Some(path) => write_json(path, &json)?,
+        None if arguments.json => return say(serde_json::to_string_pretty(&json)?),
         None => {}
     }
     warnings.iter().for_each(warn);

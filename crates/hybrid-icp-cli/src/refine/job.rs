@@ -12,7 +12,7 @@ use super::report::{self, Report};
 use super::trace::{self, TraceLines};
 use super::warnings;
 use crate::choice::PipelineArguments;
-use crate::outputs::{Files, check_png, write_picture};
+use crate::outputs::{Files, check_png, write_json, write_picture};
 use crate::terminal::{check_stdout, say, warn};
 
 /// The pipeline and the outputs.
@@ -111,14 +111,12 @@ impl JobOptions {
             &trace.trace.stages,
             time_ms,
         );
-        let json = serde_json::to_string_pretty(&report)?;
         if let Some(path) = &self.output {
-            hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
+            write_json(path, &report)?;
         }
         if let Some(path) = &self.alternatives {
             let others = refiner.alternatives().iter().map(report::alternative);
-            let json = serde_json::to_string_pretty(&others.collect::<Vec<_>>())?;
-            hicp_io::write_atomically(path, |file| writeln!(file, "{json}"))?;
+            write_json(path, &others.collect::<Vec<_>>())?;
         }
         if let Some(path) = trace_path {
             trace.write(path)?;
@@ -138,7 +136,7 @@ impl JobOptions {
         report.warnings.iter().for_each(warn);
         match self.output {
             Some(_) => say(summary),
-            None => say(json),
+            None => say(serde_json::to_string_pretty(&report)?),
         }
     }
 

@@ -20,7 +20,7 @@ use super::options::{DatasetOptions, ThreadOptions};
 use super::refine::{MaskOptions, RefineJob, RowOptions};
 use crate::choice::{Pipeline, Source};
 use crate::limits::limits;
-use crate::outputs::{Files, journal_of};
+use crate::outputs::{Files, journal_of, write_json};
 use crate::terminal::{say, table};
 
 /// Refine a result file with several pipelines, and compare them by their evaluations.
@@ -128,14 +128,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let worst = comparison.worst();
     let pictures = worst::pictures(&worst, &arguments.dataset, &arguments.results, results)?;
     let html = comparison.html(&pictures);
-    let texts = [comparison.markdown(), html, comparison.json()?];
-    for (ending, text) in FORMS.iter().zip(texts) {
-        let path = out.join(format!("{COMPARISON}.{ending}"));
+    let [markdown, page, json] = FORMS.map(|ending| out.join(format!("{COMPARISON}.{ending}")));
+    for (path, text) in [(&markdown, comparison.markdown()), (&page, html)] {
         hicp_io::write_atomically(path, |writer| writer.write_all(text.as_bytes()))?;
     }
+    write_json(&json, &comparison)?;
     let Table { head, rows, .. } = comparison.overall();
     let lines: Vec<_> = std::iter::once(head).chain(rows).collect();
-    let page = out.join(format!("{COMPARISON}.html"));
     let left_out = left_out.map_or_else(String::new, |text| format!("\n{text}"));
     say(format_args!(
         "{}{left_out}\n\n{} has the tables by object",

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use anyhow::Context as _;
 use hicp_experiments::{Table, html_escaped, html_page};
 use serde::Serialize;
 
@@ -273,12 +272,6 @@ impl Comparison {
             body += &format!("<div class=\"pictures\">\n{pictures}</div>\n");
         }
         html_page("Pipelines compared", &body)
-    }
-
-    /// Returns the comparison as JSON.
-    pub(super) fn json(&self) -> anyhow::Result<String> {
-        let text = serde_json::to_string_pretty(self).context("cannot write JSON")?;
-        Ok(text + "\n")
     }
 }
 

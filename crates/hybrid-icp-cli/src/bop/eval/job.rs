@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use clap::Args;
 use hicp_bop::{EvaluatedObject, FrameKey, Judge, Judged, JudgedFrame, Renders, Scenes, Targets};
 use hicp_io::bop::ResultRow;
@@ -16,6 +16,7 @@ use crate::bop::options::{DatasetOptions, ThreadOptions};
 use crate::bop::{faults, models, targets};
 use crate::limits::limits;
 use crate::options::positive;
+use crate::outputs::write_json;
 use crate::terminal::{progress_bar, say, warn};
 
 /// The benchmark's visibility tolerance in millimeters.
@@ -150,8 +151,7 @@ impl EvalJob {
             errors::write(path, &targets, &rows)?;
         }
         if let Some(path) = &self.json {
-            let text = serde_json::to_string_pretty(&report).context("cannot write JSON")?;
-            hicp_io::write_atomically(path, |file| writeln!(file, "{text}"))?;
+            write_json(path, &report)?;
         }
         let is_empty = report.all.targets == 0;
         if !is_empty && !self.quiet {

@@ -21,6 +21,7 @@ use self::scenes::{DEPTH_SCALE, Generator, ImageRecord};
 use super::options::ThreadOptions;
 use crate::interrupt;
 use crate::options::positive;
+use crate::outputs::write_json;
 use crate::terminal::{progress_bar, say};
 
 /// Generate a dataset of cluttered scenes, to try all commands without real data.
@@ -225,8 +226,5 @@ fn write_camera(out: &Path, camera: &PinholeCamera) -> anyhow::Result<()> {
         "cx": camera.cx(), "cy": camera.cy(), "fx": camera.fx(), "fy": camera.fy(),
         "width": camera.width(), "height": camera.height(), "depth_scale": DEPTH_SCALE,
     });
-    hicp_io::write_atomically(out.join("camera.json"), |writer| {
-        writeln!(writer, "{value:#}")
-    })?;
-    Ok(())
+    write_json(&out.join("camera.json"), &value)
 }
