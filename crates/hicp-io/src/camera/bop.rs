@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hicp_core::{Matrix3, PinholeCamera};
+use hicp_core::{CameraError, Matrix3, PinholeCamera};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
@@ -150,6 +150,16 @@ impl ReadLimits {
     }
 }
 
+/// Returns the name of the number that is wrong: fx, fy, cx or cy.
+pub(super) fn number_of(error: &CameraError) -> Option<&'static str> {
+    match error {
+        CameraError::FocalLength { name, .. } | CameraError::PrincipalPoint { name, .. } => {
+            Some(name)
+        }
+        _ => None,
+    }
+}
+
 fn camera_of(
     path: &Path,
     key: &str,
@@ -169,7 +179,9 @@ fn camera_of(
     }
     let camera = PinholeCamera::from_matrix(&matrix, width, height).map_err(|error| {
         let (found, expected) = ("numbers that are not a camera", "those of a pinhole camera");
-        refuse(name, found, expected).with_source(error)
+        let number = number_of(&error).filter(|_| name.is_empty());
+        let name = number.map_or(name.to_owned(), |number| format!(".{number}"));
+        refuse(&name, found, expected).with_source(error)
     })?;
     let depth_scale = record.depth_scale.map(|Positive(scale)| scale);
     Ok(CameraFile {
@@ -283,7 +295,7 @@ mod tests {
             "$.depth_scale"
         );
         assert_eq!(key(&FLAT.replace("600", "\"600\"")), "$.fx");
-        assert_eq!(key(&FLAT.replace("600", "-600")), "$");
+        assert_eq!(key(&FLAT.replace("600", "-600")), "$.fx");
         assert_eq!(key(&format!("{{{}}}", K.replace("600", "0"))), "$.cam_K");
         assert_eq!(key(&FLAT.replace("640", "64.5")), "$.width");
         let skewed = read(&format!("{{{}}}", K.replace("600.0, 0", "600.0, 3")));

@@ -5,7 +5,7 @@ use std::path::Path;
 use hicp_core::{Matrix3, PinholeCamera};
 use serde_json::Value;
 
-use super::bop::{CameraFile, is_bop};
+use super::bop::{CameraFile, is_bop, number_of};
 use super::distortion::Distortion;
 use crate::document::{self, numbers};
 use crate::error::{IoError, IoErrorKind, Place, quote};
@@ -27,6 +27,7 @@ const FX: [&str; 5] = ["fx", "f_u", "fl_x", "focal_length_x", "f"];
 const FY: [&str; 5] = ["fy", "f_v", "fl_y", "focal_length_y", "f"];
 const CX: [&str; 5] = ["cx", "ppx", "pp_x", "c_x", "principal_point_x"];
 const CY: [&str; 5] = ["cy", "ppy", "pp_y", "c_y", "principal_point_y"];
+const FLAT: [[&str; 5]; 4] = [FX, FY, CX, CY];
 const WIDTH: [&str; 3] = ["width", "image_width", "w"];
 const HEIGHT: [&str; 3] = ["height", "image_height", "h"];
 const DISTORTION: [&str; 6] = [
@@ -160,7 +161,11 @@ impl Form<'_> {
         let camera = PinholeCamera::from_matrix(&self.matrix()?, width, height);
         let camera = camera.map_err(|error| {
             let found = "numbers that are not a camera";
-            self.refuse("", found, "those of a pinhole camera")
+            let number = number_of(&error);
+            let keys = FLAT.iter().find(|keys| Some(keys[0]) == number);
+            let key = keys.and_then(|keys| self.member(keys));
+            let name = key.map_or(String::new(), |(key, _)| format!(".{key}"));
+            self.refuse(&name, found, "those of a pinhole camera")
                 .with_source(error)
         })?;
         let depth_scale = match self.member(&["depth_scale"]) {
@@ -184,7 +189,7 @@ impl Form<'_> {
 
     fn matrix(&self) -> Result<Matrix3<f64>, IoError> {
         let flat = || {
-            let [fx, fy, cx, cy] = [&FX, &FY, &CX, &CY].map(|keys| self.number(keys));
+            let [fx, fy, cx, cy] = FLAT.map(|keys| self.number(&keys));
             Some(vec![fx?, 0.0, cx?, 0.0, fy?, cy?, 0.0, 0.0, 1.0])
         };
         let array = numbers(self.camera).filter(|_| self.camera.is_array());
@@ -199,6 +204,7 @@ impl Form<'_> {
                 Matrix3::new(a, b, c, d, e, f, g, h, i)
             }
             [_, _, _, _, _, _, _, _, _] => Matrix3::from_row_slice(&numbers),
+            [] if self.member(&FX).is_some() => return Err(self.wrong_number()),
             _ => {
                 let found = match numbers.len() {
                     0 => "no numbers, or one that is not finite".to_owned(),
@@ -212,6 +218,25 @@ impl Form<'_> {
             true => by_rows.transpose(),
             false => by_rows,
         })
+    }
+
+    /// Returns the error for fx, fy, cx or cy, one of which is missing or not a number.
+    fn wrong_number(&self) -> IoError {
+        let wrong = FLAT.iter().find(|keys| self.number(*keys).is_none());
+        match wrong.and_then(|keys| self.member(keys)) {
+            Some((key, value)) => {
+                let found = quote(&value.to_string());
+                self.refuse(&format!(".{key}"), found, "a finite number")
+            }
+            None => {
+                let name = wrong.map_or("fx", |keys| keys[0]);
+                self.refuse(
+                    "",
+                    format!("no `{name}`"),
+                    "fx, fy, cx and cy, or a 3x3 matrix",
+                )
+            }
+        }
     }
 
     fn distortion(&self) -> Result<Option<Distortion>, IoError> {

@@ -5,7 +5,7 @@ use hicp_io::{
     CameraFile, Distortion, IoErrorKind, LengthUnit, read_camera, read_pose, register_depth,
 };
 
-use crate::common::{fixture, refused};
+use crate::common::{Folder, assert_contains, fixture, refused};
 
 fn camera() -> PinholeCamera {
     PinholeCamera::new(600.0, 610.0, 320.5, 240.25, 640, 480).unwrap()
@@ -113,6 +113,34 @@ fn undistorted_images_show_straight_edges() {
     let depth = DepthImage::from_meters(640, 480, vec![1.0; 640 * 480]).unwrap();
     let depth = distortion.undistort_depth(&camera, &depth);
     assert_eq!(depth.get(320, 240), Some(1.0));
+}
+
+#[test]
+fn a_number_that_is_missing_or_wrong_is_named() {
+    let folder = Folder::new();
+    for (text, parts) in [
+        (
+            r#"{"fx": 600, "cx": 320, "cy": 240}"#,
+            ["camera.json, $:", "no `fy`"],
+        ),
+        (
+            r#"{"fx": 600, "fy": "a", "ppx": 320, "ppy": 240}"#,
+            ["$.fy:", "finite number"],
+        ),
+        (
+            r#"{"color": {"fx": 0, "fy": 600, "ppx": 320, "ppy": 240}}"#,
+            ["$.color.fx:", "fx is 0"],
+        ),
+        (
+            r#"{"fx": 600, "fy": 600, "ppx": 1e12, "ppy": 240}"#,
+            ["$.ppx:", "cx is 1000000000000"],
+        ),
+    ] {
+        let path = folder.write("camera.json", text);
+        let error = read_camera(&path, (640, 480)).unwrap_err();
+        let cause = std::error::Error::source(&error).map(ToString::to_string);
+        assert_contains(&format!("{error}: {}", cause.unwrap_or_default()), &parts);
+    }
 }
 
 #[test]
