@@ -145,6 +145,9 @@ impl ReadLimits {
             "ply" => (ply::check_head, ply::parse_mesh),
             "stl" => (stl::check_head, stl::parse),
             _ => {
+                if let Ok((head, _)) = read_head(path) {
+                    check_format(path, &extension, &head)?;
+                }
                 let found = format!("a file with the extension {extension:?}");
                 return Err(IoError::new(path, None, found, EXTENSIONS));
             }

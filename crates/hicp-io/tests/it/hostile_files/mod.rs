@@ -95,10 +95,12 @@ fn other_text_encodings_are_refused() {
     let off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     let wide: Vec<u8> = off.encode_utf16().flat_map(u16::to_le_bytes).collect();
     refused("a.off", wide, &["UTF-16 LE"]);
-    refused("a.ply", [0x1f, 0x8b, 8, 0, 0, 0], &["gzip", "gunzip"]);
-    refused(
-        "a.ply.gz",
-        [0x1f, 0x8b, 8, 0, 0, 0],
-        &["\"gz\"", "expected .glb"],
-    );
+    for name in ["a.ply", "a.ply.gz"] {
+        refused(name, [0x1f, 0x8b, 8, 0, 0, 0], &["gzip", "gunzip"]);
+    }
+    for name in ["a.ply", "a.pcd"] {
+        let parts = ["PCD point cloud", "make a surface first"];
+        refused(name, "# .PCD v0.7\n", &parts);
+    }
+    refused("a.xyz", "0 0 0\n", &["\"xyz\"", "expected .glb"]);
 }
