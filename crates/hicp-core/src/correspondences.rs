@@ -132,6 +132,11 @@ impl Correspondences {
         self.pairs.is_empty()
     }
 
+    /// Iterates over the pairs, in the order in which they were added.
+    pub fn iter(&self) -> std::slice::Iter<'_, Pair> {
+        self.pairs.iter()
+    }
+
     /// The pairs, in the order in which they were added.
     #[must_use]
     pub fn as_slice(&self) -> &[Pair] {
@@ -154,7 +159,7 @@ impl<'a> IntoIterator for &'a Correspondences {
     type IntoIter = std::slice::Iter<'a, Pair>;
 
     fn into_iter(self) -> Self::IntoIter {
-        self.pairs.iter()
+        self.iter()
     }
 }
 
