@@ -134,8 +134,12 @@ fn columns_of(path: &Path, header: &StringRecord) -> Result<[usize; 7], IoError>
         let [(index, _)] = found[..] else {
             let text = quote(&header.iter().collect::<Vec<_>>().join(","));
             let times = found.len();
-            let found = format!("a header in which column {name:?} appears {times} times: {text}");
-            return Err(IoError::new(path, Place::Line(1), found, "it once"));
+            let found = match header.is_empty() {
+                true => "no header".to_owned(),
+                false => format!("a header in which column {name:?} appears {times} times: {text}"),
+            };
+            let expected = format!("the columns {}, separated by commas", ResultRow::header());
+            return Err(IoError::new(path, Place::Line(1), found, expected));
         };
         *column = index;
     }

@@ -125,7 +125,6 @@ fn errors_name_the_line_and_the_column_of_invalid_content() {
 #[test]
 fn tables_that_are_not_results_are_refused() {
     for (header, column, times) in [
-        ("", "scene_id", 0),
         ("a,b", "scene_id", 0),
         ("scene_id,im_id,obj_id,score,R,t", "time", 0),
         ("scene_id,im_id,obj_id,score,R,t,time,t", "t", 2),
@@ -133,8 +132,10 @@ fn tables_that_are_not_results_are_refused() {
         let error = read(header).unwrap_err();
         let found = format!("column {column:?} appears {times} times");
         assert!(error.found.contains(&found), "{error}");
+        assert!(error.expected.contains(HEADER), "{error}");
         assert_eq!(error.place, Some(Place::Line(1)));
     }
+    assert_eq!(read("").unwrap_err().found, "no header");
     let error = read(format!("{HEADER}\n50,1,2,1,{EYE},0 0 1\n")).unwrap_err();
     assert_eq!(error.place, Some(Place::Line(2)));
     assert_eq!(

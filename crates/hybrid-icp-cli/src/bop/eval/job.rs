@@ -187,6 +187,9 @@ impl EvalJob {
             let count = count.and_modify(|count| *count += 1).or_insert(1);
             beyond += usize::from(*count > *wanted);
         }
+        if rows.is_empty() {
+            warnings.push(format!("{results} has no rows"));
+        }
         // No camera sees an object that is nearer than 2 cm.
         let nearest = |row: &ResultRow| row.camera_from_object().translation.vector.norm() < 0.02;
         if !rows.is_empty() && rows.iter().all(nearest) {

@@ -58,9 +58,19 @@ impl RowOptions {
         mut rows: Vec<T>,
         file: &Path,
     ) -> anyhow::Result<Vec<T>> {
+        let count = rows.len();
         rows.truncate(self.limit.map_or(usize::MAX, |limit| limit as usize));
         let targets = self.targets.as_deref().map(targets::read).transpose()?;
         let rows = best_rows(rows, self.top_k.map(|top| top as usize), targets.as_ref());
+        if rows.is_empty() {
+            let file = file.display();
+            match count {
+                0 => warn(format_args!("{file} has no rows")),
+                _ => warn(format_args!(
+                    "{file}: none of its {count} rows is in --targets"
+                )),
+            }
+        }
         let Some(shard) = self.shard else {
             return Ok(rows);
         };

@@ -412,7 +412,12 @@ fn a_result_file_can_be_refined_in_place_and_may_be_empty() {
         world.assert_refined(before, after);
     }
     let (run, refined) = world.refine(&[], "");
-    assert!(run.exits(0).out.contains("0 rows"));
+    assert!(
+        run.exits(0)
+            .warns(&["in.csv has no rows"])
+            .out
+            .contains("0 rows")
+    );
     assert!(refined.is_empty());
 }
 

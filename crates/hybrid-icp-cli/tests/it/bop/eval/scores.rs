@@ -83,7 +83,9 @@ fn worse_estimates_have_lower_recalls_and_missing_ones_count() {
         (&found["targets"], &found["missing"]),
         (&json!(10), &json!(5))
     );
-    let none = report(&world, &[], "");
+    write_results(world.path("in.csv"), &[]).unwrap();
+    eval(&world, "").warns(&["in.csv has no rows"]);
+    let none = world.json("out.json");
     assert_eq!(recalls(&none), [0.0; 5]);
     assert_eq!(
         (&none["missing"], &none["median_adi_mm"]),
