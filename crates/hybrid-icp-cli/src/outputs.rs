@@ -152,7 +152,7 @@ fn parts_of(root: &Path, split: &str) -> BTreeSet<PathBuf> {
 }
 
 /// Returns the entries of a folder; none if it cannot be listed.
-fn entries(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn entries(folder: &Path) -> Vec<PathBuf> {
     let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
     listed.map(|entry| entry.path()).collect()
 }

@@ -1,14 +1,15 @@
 //! Options that the commands over datasets share.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use clap::Args;
-use hicp_io::IoError;
+use hicp_io::IoErrorKind;
 use hicp_io::bop::Dataset;
 
 use crate::limits::limits;
 use crate::options::file_name;
+use crate::outputs;
 
 /// The options that choose images of a dataset.
 #[derive(Clone, Debug, Args)]
@@ -26,11 +27,38 @@ pub(crate) struct DatasetOptions {
 
 impl DatasetOptions {
     /// Opens the dataset with the limits of this run, and checks that it has the split.
-    pub(crate) fn open(&self) -> Result<Dataset, IoError> {
+    pub(crate) fn open(&self) -> anyhow::Result<Dataset> {
         let dataset = Dataset::open(&self.root)?.with_limits(limits());
         let dataset = dataset.with_sensor(self.sensor.as_deref());
-        dataset.scene_ids(&self.split)?;
-        Ok(dataset)
+        match dataset.scene_ids(&self.split) {
+            Ok(_) => Ok(dataset),
+            Err(error) if error.kind == IoErrorKind::Missing => match &self.splits()[..] {
+                [] => bail!(
+                    "{error}, expected --dataset to name the folder with models/ and {}/",
+                    self.split
+                ),
+                splits => bail!(
+                    "{error}, expected --split to name one of: {}",
+                    splits.join(", ")
+                ),
+            },
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Returns the names of the folders that contain scenes.
+    fn splits(&self) -> Vec<String> {
+        let names = |folder: &Path| {
+            let folders = outputs::entries(folder)
+                .into_iter()
+                .filter(|path| path.is_dir());
+            folders.map(|path| file_name(&path))
+        };
+        let is_scene = |name: String| name.parse::<u32>().is_ok();
+        let has_scenes = |name: &String| names(&self.root.join(name)).any(is_scene);
+        let mut splits: Vec<String> = names(&self.root).filter(has_scenes).collect();
+        splits.sort();
+        splits
     }
 
     /// Returns whether a scene of the split has a folder of color images.

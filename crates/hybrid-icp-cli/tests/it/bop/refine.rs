@@ -357,7 +357,14 @@ fn failures_before_the_refinement_change_no_file() {
     );
     fails(
         "--dataset . --results in.csv --output out.csv --split tset",
-        &["split is missing", "tset"],
+        &["split is missing", "tset", "--split to name one of: test"],
+    );
+    fails(
+        "--dataset ./test --results in.csv --output out.csv",
+        &[
+            "split is missing",
+            "--dataset to name the folder with models/ and test/",
+        ],
     );
     fails(
         "--dataset . --results gone.csv --output out.csv",
