@@ -6,7 +6,7 @@ use std::time::Instant;
 use hicp_io::bop::{Detection, ResultRow};
 use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::icp::{Alternative, Verdict};
-use hybrid_icp::{Refinement, Refiner, warnings};
+use hybrid_icp::{Refinement, Refiner, warning_of_box, warnings};
 
 use crate::bop_image::BopImage;
 use crate::fault::Fault;
@@ -174,7 +174,12 @@ impl Work<'_, '_> {
                     self.done(start, *index, &found);
                     if !std::mem::replace(&mut looked, true) {
                         let pose = &found.outcome.camera_from_object;
-                        let warnings = warnings(model, &observation, pose).into_iter();
+                        let mut warnings = warnings(model, &observation, pose);
+                        let bbox = detection.ok().filter(|d| d.segmentation.is_none());
+                        let bbox = bbox.and_then(|detection| detection.bbox);
+                        let size = observation.camera().size();
+                        warnings.extend(bbox.and_then(|bbox| warning_of_box(bbox, size)));
+                        let warnings = warnings.into_iter();
                         self.result.warnings.extend(warnings.map(|d| (obj_id, d)));
                     }
                 }

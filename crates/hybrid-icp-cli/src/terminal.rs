@@ -44,6 +44,14 @@ fn printable(text: impl Display) -> String {
     shown
 }
 
+/// Returns a number with its noun, in the plural unless the number is 1.
+pub(crate) fn counted(number: usize, noun: &str) -> String {
+    match number {
+        1 => format!("1 {noun}"),
+        _ => format!("{number} {noun}s"),
+    }
+}
+
 /// Returns an error if the shell closed standard output (`>&-`), where a result would be lost.
 ///
 /// Rust replaces a closed stream by `/dev/null`, open for reading and writing. Redirected output is

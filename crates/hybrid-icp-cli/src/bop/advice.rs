@@ -14,6 +14,7 @@ pub(crate) fn advice(warning: &Warning, poses: Option<&str>) -> Option<String> {
         Warning::Sliver { .. } => {
             Some("check that models are in mm, and that masks show the object".to_owned())
         }
+        Warning::Box { .. } => Some("check bbox in --detections".to_owned()),
         _ => None,
     }
 }

@@ -15,7 +15,7 @@ use super::{rows_file, settings, warnings};
 use crate::bop::models;
 use crate::interrupt;
 use crate::outputs::journal_of;
-use crate::terminal::{progress_bar, say, warn};
+use crate::terminal::{counted, progress_bar, say, warn};
 
 impl RefineJob<'_> {
     /// Refines the rows, writes the output and reports what happened.
@@ -92,12 +92,12 @@ impl RefineJob<'_> {
 
         let distrust = Distrust::of(&results);
         let mut text = format!(
-            "{}: {} rows of {} frames in {:.1} s on {} threads",
+            "{}: {} of {} in {:.1} s on {}",
             self.output.display(),
-            n_rows,
-            results.len(),
+            counted(n_rows, "row"),
+            counted(results.len(), "frame"),
             start.elapsed().as_secs_f64(),
-            pool.current_num_threads(),
+            counted(pool.current_num_threads(), "thread"),
         );
         if resumed > 0 {
             text.push_str(&format!(", {resumed} frames from the journal"));

@@ -10,6 +10,9 @@ use crate::bop::advice::{advice, is_about_diameter};
 use crate::bop::models;
 use crate::terminal::warn;
 
+/// Largest number of objects with the same advice that are reported one by one.
+const OBJECTS_SHOWN: usize = 3;
+
 /// Largest number of scenes that a message names.
 const SCENES_SHOWN: usize = 5;
 
@@ -71,15 +74,30 @@ pub(super) fn about_images(
             of_object.push((scene_id, count, all, first));
         }
     }
-    let in_words = |((obj_id, advice), scenes): ((u32, String), Vec<OfScene>)| {
+    let mut texts = Vec::new();
+    let mut objects: BTreeMap<String, usize> = BTreeMap::new();
+    for ((obj_id, advice), scenes) in by_object {
+        let number = objects.entry(advice.clone()).or_default();
+        *number += 1;
+        if *number > OBJECTS_SHOWN {
+            continue;
+        }
         let first = scenes[0].3;
         let count: usize = scenes.iter().map(|(_, count, ..)| count).sum();
         let all: usize = scenes.iter().map(|(_, _, all, _)| all).sum();
         let scenes: Vec<u32> = scenes.iter().map(|(scene_id, ..)| *scene_id).collect();
         let scenes = name_scenes(&scenes);
-        format!("object {obj_id}: {first} ({count} of {all} images of {scenes}): {advice}")
-    };
-    by_object.into_iter().map(in_words).collect()
+        texts.push(format!(
+            "object {obj_id}: {first} ({count} of {all} images of {scenes}): {advice}"
+        ));
+    }
+    for (advice, number) in objects {
+        if number > OBJECTS_SHOWN {
+            let more = number - OBJECTS_SHOWN;
+            texts.push(format!("{more} more objects like this: {advice}"));
+        }
+    }
+    texts
 }
 
 /// Names scenes by their ids, the first few of many.

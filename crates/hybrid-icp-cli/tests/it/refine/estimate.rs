@@ -181,3 +181,19 @@ fn every_detection_becomes_a_row_with_its_score_and_its_time() {
     assert_eq!(status[1], "3,0,9,,kept: missing model,,,,");
     assert!(status[4].starts_with("3,40,2,0,refined,"), "{}", status[4]);
 }
+
+#[test]
+fn boxes_of_two_corners_are_warned_of() {
+    let world = World::new();
+    let mut found = world.detections(|_| true);
+    found.truncate(1);
+    found[0].as_object_mut().unwrap().remove("segmentation");
+    found[0]["bbox"] = json!([100, 80, 300, 220]);
+    world.write("found.json", json!(found).to_string());
+    let parts = [
+        "the box ends at (400, 300)",
+        "1 of 1 images of scene 3",
+        "check bbox in --detections",
+    ];
+    bop_estimate(&world, "--pipeline hybrid").0.warns(&parts);
+}
