@@ -134,7 +134,7 @@ pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, 
             return Err(reading.refuse(place, quote(other), expected));
         }
     }
-    points.finish()
+    Ok(points.finish()?.organized(header.height > 1))
 }
 
 #[derive(Debug, Default)]

@@ -14,8 +14,16 @@ pub struct PointCloud {
     /// One unit normal per point, or none at all.
     pub normals: Option<Vec<UnitVector3<f32>>>,
     /// Number of points of the file that were skipped: they are not finite, or have no normal in a
-    /// file with normals.
+    /// file with normals. In the clouds of images, pixels without a measurement do not count.
     pub n_skipped: usize,
+}
+
+impl PointCloud {
+    /// Forgets the skipped points if the file has the rows and columns of an image.
+    pub(super) fn organized(self, is_organized: bool) -> Self {
+        let n_skipped = if is_organized { 0 } else { self.n_skipped };
+        Self { n_skipped, ..self }
+    }
 }
 
 /// The points of a file that is being parsed.

@@ -72,7 +72,8 @@ pub(super) fn parse_npy(reading: Reading<'_>, content: &[u8]) -> Result<PointClo
             .for_each(|(value, number)| *value = *number);
         (Place::Byte(0), values)
     });
-    collect(reading, &rows.collect::<Vec<_>>(), false)
+    let cloud = collect(reading, &rows.collect::<Vec<_>>(), false)?;
+    Ok(cloud.organized(array.shape.len() > 2))
 }
 
 /// Collects the rows. Columns 4 to 6 are normals if they are named so, or all have length 1.
