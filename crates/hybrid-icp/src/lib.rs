@@ -127,12 +127,13 @@ pub mod prelude {
     pub use crate::{Preset, Refinement, Refiner, presets};
     pub use hicp_association::{
         AllSamples, DataAssociation, MaxDistance, MaxNormalAngle, NearestNeighbor, OutlierFilter,
-        Projective, VisibleSurface,
+        PointSelection, Projective, VisibleSurface,
     };
     pub use hicp_core::{
         Context, Correspondences, DepthImage, Isometry3, Iteration, Mask, Model, Observation, Pair,
         PinholeCamera, Point3, Problem, Surfel, TriMesh, Vector3,
     };
+    pub use hicp_fusion::Fuser;
     pub use hicp_icp::{
         Cascade, Convergence, Divergence, Icp, IterationLimit, Judgment, Outcome, Progress, Repeat,
         Session, SmallMotion, Stage, StopRule, Termination, Verdict,
@@ -141,5 +142,5 @@ pub mod prelude {
         ErrorMetric, Kernel, NormalEquations, PointToPlane, PointToPoint, Robust, Scale,
     };
     pub use hicp_score::{MeanVsd, Score};
-    pub use hicp_switch::{Switch, Threshold};
+    pub use hicp_switch::{Switch, Switcher, Threshold};
 }

@@ -17,7 +17,7 @@ use super::follow::FollowOptions;
 use super::statistics::{count, median};
 use crate::options::positive;
 use crate::pose_json::add_pose;
-use crate::terminal::{progress_bar, say};
+use crate::terminal::{counted, progress_bar, say};
 
 /// Track a moving object through the images of a scene, without masks.
 ///
@@ -83,9 +83,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         seen.map(|line| line.row(scene_id, object)),
     )?;
     say(format_args!(
-        "{}: {} images of scene {scene_id}, object {object}{}",
+        "{}: {} of scene {scene_id}, object {object}{}",
         follow.output.display(),
-        lines.len(),
+        counted(lines.len(), "image"),
         summarize(&lines),
     ))?;
     let tracking = |line: &Line| line.tracked.state == TrackState::Tracking;

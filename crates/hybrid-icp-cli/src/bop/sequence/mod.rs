@@ -25,7 +25,7 @@ use super::statistics::{count, median};
 use super::{faults, models};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
-use crate::terminal::{progress_bar, say, warn};
+use crate::terminal::{counted, progress_bar, say, warn};
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
 ///
@@ -133,8 +133,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
     let (output, method) = (follow.output.display(), arguments.fuser);
     say(format_args!(
-        "{output}: {} images of scene {scene_id}, object {object}, {method} over {} in {:.1} s{}",
-        lines.len(),
+        "{output}: {} of scene {scene_id}, object {object}, {method} over {} in {:.1} s{}",
+        counted(lines.len(), "image"),
         pipeline.name,
         start.elapsed().as_secs_f64(),
         summarize(&lines),
