@@ -10,11 +10,10 @@ use crate::bop::advice::{advice, is_about_diameter};
 use crate::bop::models;
 use crate::terminal::warn;
 
-/// Largest number of objects with the same advice that are reported one by one.
+/// Largest number of objects with the same advice that are described one by one.
 const OBJECTS_SHOWN: usize = 3;
-
-/// Largest number of scenes that a message names.
-const SCENES_SHOWN: usize = 5;
+/// Largest number of scenes or of further objects that a message names.
+const IDS_SHOWN: usize = 5;
 
 /// Warns of models that seem to have another unit and of diameters that differ from the meshes.
 pub(super) fn about_models(models: &Models, folder: &ModelFolder) {
@@ -75,37 +74,61 @@ pub(super) fn about_images(
         }
     }
     let mut texts = Vec::new();
-    let mut objects: BTreeMap<String, usize> = BTreeMap::new();
+    let mut others: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+    let mut shown: BTreeMap<String, usize> = BTreeMap::new();
     for ((obj_id, advice), scenes) in by_object {
-        let number = objects.entry(advice.clone()).or_default();
+        let number = shown.entry(advice.clone()).or_default();
         *number += 1;
         if *number > OBJECTS_SHOWN {
+            others.entry(advice).or_default().push(obj_id);
             continue;
         }
         let first = scenes[0].3;
         let count: usize = scenes.iter().map(|(_, count, ..)| count).sum();
         let all: usize = scenes.iter().map(|(_, _, all, _)| all).sum();
         let scenes: Vec<u32> = scenes.iter().map(|(scene_id, ..)| *scene_id).collect();
-        let scenes = name_scenes(&scenes);
+        let scenes = named("scene", &scenes);
         texts.push(format!(
             "object {obj_id}: {first} ({count} of {all} images of {scenes}): {advice}"
         ));
     }
-    for (advice, number) in objects {
-        if number > OBJECTS_SHOWN {
-            let more = number - OBJECTS_SHOWN;
-            texts.push(format!("{more} more objects like this: {advice}"));
-        }
-    }
+    let others = others.into_iter();
+    texts.extend(
+        others.map(|(advice, ids)| format!("{} likewise: {advice}", named("object", &ids))),
+    );
     texts
 }
 
-/// Names scenes by their ids, the first few of many.
-fn name_scenes(scenes: &[u32]) -> String {
-    let shown = models::ids(scenes.iter().take(SCENES_SHOWN));
-    match scenes.len() {
-        1 => format!("scene {shown}"),
-        count if count <= SCENES_SHOWN => format!("scenes {shown}"),
-        count => format!("scenes {shown} and {} more", count - SCENES_SHOWN),
+/// Names scenes or objects by their ids, the first few of many.
+fn named(noun: &str, all: &[u32]) -> String {
+    let shown = models::ids(all.iter().take(IDS_SHOWN));
+    match all.len() {
+        1 => format!("{noun} {shown}"),
+        count if count <= IDS_SHOWN => format!("{noun}s {shown}"),
+        count => format!("{noun}s {shown} and {} more", count - IDS_SHOWN),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hicp_bop::{RowResult, RowStatus};
+    use hybrid_icp::core::Isometry3;
+
+    use super::*;
+
+    #[test]
+    fn three_objects_with_the_same_advice_are_described_and_the_others_named() {
+        let rows = (0..5).map(|id| ResultRow::new(1, id, id, Isometry3::identity()));
+        let rows: Vec<_> = rows.collect();
+        let result = |index: usize| FrameResult {
+            rows: vec![RowResult::unrefined(index, RowStatus::NoMask)],
+            warnings: vec![(rows[index].obj_id, Warning::NoDepth)],
+            ..FrameResult::default()
+        };
+        let results: Vec<_> = (0..5).map(result).collect();
+        let texts = about_images(&results, &rows, None);
+        assert_eq!(texts.len(), 4, "{texts:?}");
+        assert!(texts[2].starts_with("object 2: "), "{texts:?}");
+        assert!(texts[3].starts_with("objects 3, 4 likewise: "), "{texts:?}");
     }
 }
