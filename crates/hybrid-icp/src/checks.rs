@@ -52,11 +52,10 @@ const DIAMETER_TOLERANCE: f64 = 0.05;
 const SIZES: [f64; 8] = [0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 1.5, 2.0, 3.0, 4.0];
 /// Largest distance of a principal point from the middle of that image, in halves of the width.
 const CENTERED: f64 = 0.06;
-/// Length of the mask relative to the diameter above which its image was not resized, times the
-/// factor of the size. Without that factor, no mask is longer than 1, except for its errors.
-const RESIZED_LENGTH: f64 = 1.15;
-/// Largest such length that says anything: a longer mask shows more than the object.
-const LONGEST: f64 = 1.3;
+/// Length of a mask, in diameters, that no object has, also if the mask has errors.
+const TOO_LONG: f64 = 1.15;
+/// Length from which on a mask shows more than the object, so that its length says nothing.
+const NOT_OF_OBJECT: f64 = 1.3;
 /// Largest logarithm of the ratio of the sides of a pixel.
 const SQUARE: f64 = 0.1;
 /// Largest angle between the optical axis and a pixel. The corners of the widest depth cameras are
@@ -114,17 +113,14 @@ pub fn warnings_of_image(
     median_depth: Option<f64>,
 ) -> Vec<Warning> {
     let camera = observation.camera();
-    let mut warnings = Vec::from_iter(warning_of_center(camera));
-    if let [
-        Warning::Center {
-            fault: CenterFault::Resized { factor },
-            ..
-        },
-    ] = warnings[..]
-        && median_depth.is_some_and(|depth| fits_mask(model, observation, depth, factor))
-    {
-        warnings.clear();
-    }
+    let is_crop = |warning: &Warning| match (warning, median_depth) {
+        (Warning::Center { fault, .. }, Some(depth)) => {
+            was_cropped(model, observation, depth, *fault)
+        }
+        _ => false,
+    };
+    let center = warning_of_center(camera).filter(|warning| !is_crop(warning));
+    let mut warnings = Vec::from_iter(center);
     match warning_of_distance(distance, median_depth) {
         None if median_depth.is_none() && pixels > 0 => warnings.push(Warning::NoDepth),
         warning => warnings.extend(warning),
@@ -316,7 +312,7 @@ fn smallest_side(model: &Model) -> f64 {
 /// Returns [`Warning::Center`] if the intrinsics are hardly those of the image.
 ///
 /// The principal point of a cropped image may be anywhere, also outside. If a crop looks like a
-/// resized image, the mask decides ([`fits_mask`]).
+/// resized image, the mask decides ([`was_cropped`]).
 fn warning_of_center(camera: &PinholeCamera) -> Option<Warning> {
     let (width, height) = (f64::from(camera.width()), f64::from(camera.height()));
     let (u, v) = (0.5 * width, 0.5 * height);
@@ -383,15 +379,18 @@ pub fn warning_of_box([x, y, w, h]: [f64; 4], (width, height): (u32, u32)) -> Op
     })
 }
 
-/// Returns whether the mask is as long as the model at a depth, so that the focal length is right.
+/// Returns whether an image that seems to be resized was cropped, by the length of its mask.
 ///
-/// The image was then cropped, and not resized by `factor`.
-fn fits_mask(model: &Model, observation: &Observation, depth: f64, factor: f64) -> bool {
+/// With the focal length of a resized image, the mask would be longer than the model at that depth.
+fn was_cropped(model: &Model, observation: &Observation, depth: f64, fault: CenterFault) -> bool {
+    let CenterFault::Resized { factor } = fault else {
+        return false;
+    };
     let (camera, region) = (observation.camera(), observation.region());
     let across = region.width() as f64 / camera.fx();
     let down = region.height() as f64 / camera.fy();
     let length = across.max(down) * depth / model.diameter();
-    length > RESIZED_LENGTH / factor && length < LONGEST && !touches_border(observation)
+    factor * length > TOO_LONG && length < NOT_OF_OBJECT && !touches_border(observation)
 }
 
 /// Returns whether the mask may continue beyond the image.
