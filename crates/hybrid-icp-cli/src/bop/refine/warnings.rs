@@ -74,13 +74,11 @@ pub(super) fn about_images(
         }
     }
     let mut texts = Vec::new();
-    let mut others: BTreeMap<String, Vec<u32>> = BTreeMap::new();
-    let mut shown: BTreeMap<String, usize> = BTreeMap::new();
+    let mut objects: BTreeMap<String, Vec<u32>> = BTreeMap::new();
     for ((obj_id, advice), scenes) in by_object {
-        let number = shown.entry(advice.clone()).or_default();
-        *number += 1;
-        if *number > OBJECTS_SHOWN {
-            others.entry(advice).or_default().push(obj_id);
+        let alike = objects.entry(advice.clone()).or_default();
+        alike.push(obj_id);
+        if alike.len() > OBJECTS_SHOWN {
             continue;
         }
         let first = scenes[0].3;
@@ -92,10 +90,11 @@ pub(super) fn about_images(
             "object {obj_id}: {first} ({count} of {all} images of {scenes}): {advice}"
         ));
     }
-    let others = others.into_iter();
-    texts.extend(
-        others.map(|(advice, ids)| format!("{} likewise: {advice}", named("object", &ids))),
-    );
+    for (advice, alike) in objects {
+        if let Some(others @ [_, ..]) = alike.get(OBJECTS_SHOWN..) {
+            texts.push(format!("{} likewise: {advice}", named("object", others)));
+        }
+    }
     texts
 }
 
