@@ -7,8 +7,9 @@ use crate::association::data_association::DataAssociation;
 use crate::search::box_tree::Stack;
 #[cfg(feature = "kiddo")]
 use crate::search::kd_tree::KdTree;
-use crate::search::nearest::PointIndex;
+use crate::search::neighborhood::Neighborhood;
 use crate::search::observed_points::ObservedPoints;
+use crate::search::point_index::PointIndex;
 use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
 
@@ -27,8 +28,8 @@ pub struct NearestNeighbor {
     pub targets: Stride,
     /// The index to search.
     pub index: SearchIndex,
-    /// For each source point, the index element of its last pair.
-    last: Scratch<Vec<u32>>,
+    /// The index that was last searched, and for each source point the points near it.
+    near: Scratch<(Option<u64>, Vec<Neighborhood>)>,
 }
 
 /// The index that [`NearestNeighbor`] searches.
@@ -40,10 +41,9 @@ pub struct NearestNeighbor {
 pub enum SearchIndex {
     /// A tree of bounding boxes, eight to a node. The presets use it.
     ///
-    /// A search starts from the pair of the last iteration and visits only boxes that may hold
-    /// something nearer (compare Greenspan & Godin 2001). A point moves little between iterations,
-    /// so few boxes remain. Of equally near points, the first in the image is returned. The result
-    /// does not depend on the start of the search.
+    /// A search finds the eight nearest points. In later iterations, a point that has moved little
+    /// since compares these alone (compare Greenspan & Godin 2001). Of equally near points, the
+    /// first in the image is returned. The result does not depend on earlier searches.
     #[default]
     BoxTree,
     /// kiddo's k-d tree. Of equally near points, any may be returned.
@@ -58,7 +58,7 @@ impl NearestNeighbor {
         Self {
             targets,
             index,
-            last: Scratch::default(),
+            near: Scratch::default(),
         }
     }
 
@@ -70,15 +70,19 @@ impl NearestNeighbor {
         pairs: &mut Correspondences,
     ) {
         let observed = ObservedPoints::<T>::of(target, self.targets);
-        let last = &mut self.last.0;
-        // Any element is a valid start, so elements of another run cost time at worst.
-        last.resize(source.len(), 0);
+        let (id, near) = &mut self.near.0;
+        if *id != Some(observed.id()) {
+            *id = Some(observed.id());
+            near.clear();
+        }
+        // Points near other queries cost time at worst.
+        near.resize(source.len(), Neighborhood::UNKNOWN);
         pairs.reserve(source.len());
         vectorized(Search {
             observed: &observed,
             source,
             camera_from_object: RigidTransform::new(camera_from_object),
-            last,
+            near,
             pairs,
         });
     }
@@ -125,7 +129,7 @@ struct Search<'a, T> {
     observed: &'a ObservedPoints<T>,
     source: &'a [Surfel],
     camera_from_object: RigidTransform,
-    last: &'a mut [u32],
+    near: &'a mut [Neighborhood],
     pairs: &'a mut Correspondences,
 }
 
@@ -135,12 +139,12 @@ impl<T: PointIndex> VectorLoop for Search<'_, T> {
     #[inline(always)]
     fn run(self) {
         let mut stack = Stack::default();
-        for ((source_index, surfel), last) in (0..).zip(self.source).zip(self.last) {
+        for ((source_index, surfel), near) in (0..).zip(self.source).zip(self.near) {
             let source = self.camera_from_object.surfel(surfel);
-            let start = self.observed.start_at(*last, &source.point);
-            let found = (self.observed.index()).nearest_from(&source.point, start, &mut stack);
+            let point = |element| self.observed.get(element).1.point;
+            let index = self.observed.index();
+            let found = index.nearest_to_moved(&source.point, near, &mut stack, point);
             let Some(element) = found else { continue };
-            *last = element;
             let (target_index, target) = self.observed.get(element);
             self.pairs
                 .push(Pair::new(source_index, source, target_index, target));

@@ -9,7 +9,7 @@ use hicp_core::{
 use crate::association::data_association::DataAssociation;
 use crate::association::from_observation::{FromObservation, IndexedSurface, faces};
 use crate::search::box_tree::Stack;
-use crate::search::nearest::PointIndex;
+use crate::search::point_index::PointIndex;
 use crate::search::point_tree::PointTree;
 use crate::stride::Stride;
 

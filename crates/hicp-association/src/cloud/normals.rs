@@ -4,7 +4,8 @@ use hicp_core::internal::{VectorLoop, vectorized};
 use hicp_core::{Point3, UnitVector3, Vector3};
 
 use crate::search::box_tree::Stack;
-use crate::search::nearest::{Nearest, PointIndex};
+use crate::search::nearest::Nearest;
+use crate::search::point_index::PointIndex;
 use crate::search::point_tree::PointTree;
 
 /// Ratio of the two smaller principal variances to the largest below which points lie on a line.

@@ -2,8 +2,6 @@
 
 use hicp_core::Point3;
 
-use crate::search::box_tree::Stack;
-
 /// Returns |a − b|², the same bits for (b, a).
 #[inline(always)]
 pub(crate) fn distance_squared(a: &Point3<f32>, b: &Point3<f32>) -> f32 {
@@ -27,10 +25,25 @@ impl Nearest {
         element: u32::MAX,
     };
 
+    #[inline(always)]
+    pub(crate) fn new(distance_squared: f32, element: u32) -> Self {
+        Self {
+            distance_squared,
+            element,
+        }
+    }
+
     /// Returns a number with the order of [`Nearest::precedes`]. The distance must not be negative.
     #[inline(always)]
     pub(crate) fn key(&self) -> u64 {
         u64::from(self.distance_squared.to_bits()) << 32 | u64::from(self.element)
+    }
+
+    /// Returns the result of a [`Nearest::key`].
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation)]
+    pub(crate) fn of_key(key: u64) -> Self {
+        Self::new(f32::from_bits((key >> 32) as u32), key as u32)
     }
 
     /// Compares by distance. Of equally near points, the first precedes.
@@ -39,16 +52,4 @@ impl Nearest {
         self.distance_squared < other.distance_squared
             || (self.distance_squared == other.distance_squared && self.element < other.element)
     }
-}
-
-/// An index over points for [`NearestNeighbor`](crate::NearestNeighbor).
-pub(crate) trait PointIndex: Send + Sync + 'static {
-    /// Builds the index. The points must be finite.
-    fn new(points: &[Point3<f32>]) -> Self;
-
-    /// Returns the index of the point nearest to `query`.
-    ///
-    /// `start` is one of the points at its true distance, or [`Nearest::NONE`]. A near one saves
-    /// time. The result does not depend on it. Returns `None` if no point is at a finite distance.
-    fn nearest_from(&self, query: &Point3<f32>, start: Nearest, stack: &mut Stack) -> Option<u32>;
 }

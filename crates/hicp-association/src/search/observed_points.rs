@@ -1,16 +1,22 @@
 //! The surfels of a target at a stride, searchable by position.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use hicp_core::{Point3, Surfel, Target};
 
-use crate::search::nearest::{Nearest, PointIndex, distance_squared};
+use crate::search::point_index::PointIndex;
 use crate::stride::Stride;
+
+/// The number of indices that were built.
+static INDICES: AtomicU64 = AtomicU64::new(0);
 
 /// The observed surfels of one stride with their indices, and an index over their positions.
 ///
 /// The index numbers the surfels from 0 in the order of the target.
 pub(crate) struct ObservedPoints<T> {
+    /// The number of this index, which no other index of the process has.
+    id: u64,
     surfels: Vec<(u32, Surfel)>,
     index: T,
 }
@@ -30,8 +36,14 @@ impl<T: PointIndex> ObservedPoints<T> {
             // Surfels of observations and clouds are finite by construction.
             let points: Vec<Point3<f32>> = surfels.iter().map(|(_, s)| s.point).collect();
             let index = T::new(&points);
-            Self { surfels, index }
+            let id = INDICES.fetch_add(1, Ordering::Relaxed);
+            Self { id, surfels, index }
         })
+    }
+
+    /// Returns the number of the index.
+    pub(crate) fn id(&self) -> u64 {
+        self.id
     }
 
     /// Returns the number of surfels.
@@ -49,19 +61,5 @@ impl<T: PointIndex> ObservedPoints<T> {
     #[inline(always)]
     pub(crate) fn get(&self, element: u32) -> (u32, Surfel) {
         self.surfels[element as usize]
-    }
-
-    /// Returns an element with its distance from `query`, as the start of a search.
-    ///
-    /// If there is no such element, returns [`Nearest::NONE`].
-    #[inline(always)]
-    pub(crate) fn start_at(&self, element: u32, query: &Point3<f32>) -> Nearest {
-        match self.surfels.get(element as usize) {
-            Some((_, surfel)) => Nearest {
-                distance_squared: distance_squared(query, &surfel.point),
-                element,
-            },
-            None => Nearest::NONE,
-        }
     }
 }

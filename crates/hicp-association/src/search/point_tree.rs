@@ -4,7 +4,9 @@ use hicp_core::Point3;
 use hicp_core::internal::stored;
 
 use crate::search::box_tree::{BoxTree, Stack};
-use crate::search::nearest::{Nearest, PointIndex};
+use crate::search::nearest::Nearest;
+use crate::search::neighborhood::{Found, distances};
+use crate::search::point_index::PointIndex;
 
 /// Points per leaf. Comparing two vectors of points costs less than visiting another node.
 const LEAF_SIZE: usize = 16;
@@ -27,9 +29,12 @@ impl PointIndex for PointTree {
     }
 
     #[inline(always)]
-    fn nearest_from(&self, query: &Point3<f32>, start: Nearest, stack: &mut Stack) -> Option<u32> {
-        self.search(query, start, stack, |_| true)
-            .map(|nearest| nearest.element)
+    fn points_near(&self, query: &Point3<f32>, within: f32, stack: &mut Stack) -> Found {
+        let mut found = Found::only(Nearest::NONE);
+        self.visit(query, within, stack, |point| {
+            found.insert(point).min(within)
+        });
+        found
     }
 }
 
@@ -58,7 +63,7 @@ impl PointTree {
     /// Returns the nearest point.
     #[inline(always)]
     pub(crate) fn nearest(&self, query: &Point3<f32>, stack: &mut Stack) -> Option<Nearest> {
-        self.search(query, Nearest::NONE, stack, |_| true)
+        self.nearest_where(query, stack, |_| true)
     }
 
     /// Returns the nearest of the points whose index `accept` accepts.
@@ -69,22 +74,7 @@ impl PointTree {
         stack: &mut Stack,
         accept: impl Fn(u32) -> bool,
     ) -> Option<Nearest> {
-        self.search(query, Nearest::NONE, stack, accept)
-    }
-
-    #[inline(always)]
-    fn search(
-        &self,
-        query: &Point3<f32>,
-        start: Nearest,
-        stack: &mut Stack,
-        accept: impl Fn(u32) -> bool,
-    ) -> Option<Nearest> {
-        let mut best = if start.precedes(&Nearest::NONE) {
-            start
-        } else {
-            Nearest::NONE
-        };
+        let mut best = Nearest::NONE;
         self.visit(query, best.distance_squared, stack, |found| {
             if found.precedes(&best) && accept(found.element) {
                 best = found;
@@ -179,27 +169,13 @@ impl PointTree {
     }
 }
 
-/// Returns the squared distances of the points of a leaf.
-///
-/// They are rounded as in [`distance_squared`](super::nearest::distance_squared).
-#[inline(always)]
-fn distances(leaf: &[[f32; LEAF_SIZE]; 3], query: &Point3<f32>) -> [f32; LEAF_SIZE] {
-    let mut distances = [0.0; LEAF_SIZE];
-    for (lane, distance) in distances.iter_mut().enumerate() {
-        let (x, y, z) = (
-            query.x - leaf[0][lane],
-            query.y - leaf[1][lane],
-            query.z - leaf[2][lane],
-        );
-        *distance = x * x + y * y + z * z;
-    }
-    distances
-}
-
 #[cfg(test)]
 mod tests {
+    use hicp_core::Vector3;
+
     use super::*;
     use crate::search::nearest::distance_squared;
+    use crate::search::neighborhood::Neighborhood;
 
     fn number(state: &mut u64) -> f32 {
         *state = state
@@ -227,10 +203,6 @@ mod tests {
                     let mut all: Vec<Nearest> = (0..count).map(at).collect();
                     all.sort_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared));
                     assert_eq!(tree.nearest(query, stack), Some(all[0]));
-                    for start in [0, count - 1, count / 2].map(at) {
-                        let found = tree.nearest_from(query, start, stack);
-                        assert_eq!(found, Some(all[0].element), "{count} {start:?}");
-                    }
                     let odd = all.iter().find(|found| found.element % 2 == 1);
                     assert_eq!(
                         tree.nearest_where(query, stack, |i| i % 2 == 1),
@@ -252,6 +224,42 @@ mod tests {
         }
     }
 
+    /// Moves a query by long and short steps, on a coarse grid too, where ties are common.
+    #[test]
+    fn the_nearest_of_a_moving_query_is_that_of_brute_force() {
+        let (mut state, stack) = (7, &mut Stack::default());
+        let (mut searches, mut queries) = (0, 0);
+        for count in [1, 2, 8, 9, 40, 1000] {
+            for cells in [6.0, 1e6] {
+                let mut vector = |scale: f32| {
+                    Vector3::from([(); 3].map(|()| (number(&mut state) * cells).floor() / cells))
+                        * scale
+                };
+                let points: Vec<_> = (0..count).map(|_| Point3::from(vector(1.0))).collect();
+                let tree = PointTree::new(&points);
+                let mut near = Neighborhood::UNKNOWN;
+                let mut query = Point3::from(vector(1.0));
+                for step in 0..400 {
+                    let scale = [0.5, 0.01, 0.001][step / 3 % 3];
+                    query += vector(2.0 * scale) - Vector3::repeat(scale);
+                    let key = |element: u32| {
+                        let point = &points[element as usize];
+                        Nearest::new(distance_squared(&query, point), element).key()
+                    };
+                    queries += 1;
+                    searches += u32::from(near.nearest(&query).is_err());
+                    let point = |element| points[element as usize];
+                    let found = tree.nearest_to_moved(&query, &mut near, stack, point);
+                    assert_eq!(found, (0..count).min_by_key(|element| key(*element)));
+                }
+            }
+        }
+        assert!(
+            (queries / 20..queries / 2).contains(&searches),
+            "{searches} of {queries}"
+        );
+    }
+
     #[test]
     fn empty_trees_and_queries_that_are_not_finite_find_nothing() {
         let stack = &mut Stack::default();
@@ -259,11 +267,9 @@ mod tests {
         let tree = PointTree::new(&[Point3::origin()]);
         for x in [f32::NAN, f32::INFINITY, f32::MAX] {
             let query = Point3::new(x, 0.0, 0.0);
-            let start = Nearest {
-                distance_squared: distance_squared(&query, &Point3::origin()),
-                element: 0,
-            };
-            assert_eq!(tree.nearest_from(&query, start, stack), None, "{x}");
+            let mut near = Neighborhood::UNKNOWN;
+            let found = tree.nearest_to_moved(&query, &mut near, stack, |_| Point3::origin());
+            assert_eq!(found, None, "{x}");
             assert_eq!(tree.nearest(&query, stack), None, "{x}");
         }
     }

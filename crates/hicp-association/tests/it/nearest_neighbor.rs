@@ -245,6 +245,22 @@ fn strides_of_one_observation_do_not_share_a_tree() {
 }
 
 #[test]
+fn an_association_that_is_used_again_gives_the_pairs_of_a_new_one() {
+    let mut numbers = Numbers(31);
+    let images = [0.5, 0.501].map(|z| observe_depth(depth_image(&camera(), |_| z), &camera()));
+    let source = surfels(&mut numbers, 50, 0.2);
+    for mut used in nearest_neighbors(Stride::Pixels(2)) {
+        for step in 0..40 {
+            let image = &images[step / 4 % 2];
+            let pose = Isometry3::translation(1e-4 * step as f64, 0.0, 0.4);
+            let mut new = NearestNeighbor::new(used.targets, used.index);
+            let pairs = [&mut used, &mut new].map(|a| associate(a, image, &source, &pose));
+            assert_eq!(pairs[0].as_slice(), pairs[1].as_slice(), "{step}");
+        }
+    }
+}
+
+#[test]
 fn a_point_search_equals_brute_force_and_skips_what_is_not_finite() {
     let mut numbers = Numbers(17);
     let mut points: Vec<_> = surfels(&mut numbers, 300, 1.0)
