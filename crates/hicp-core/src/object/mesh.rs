@@ -304,28 +304,9 @@ impl TriMesh {
 
 /// Determines closedness from directed edges, and orientation from the signed volume of every part.
 fn find_facing(mesh: &TriMesh) -> Facing {
-    let welded = weld(mesh.vertices());
-    let triangles: Vec<[u32; 3]> = mesh
-        .triangles()
-        .iter()
-        .map(|corners| corners.map(|i| welded[i as usize]))
-        .filter(|[a, b, c]| a != b && b != c && c != a)
-        .collect();
-
-    let mut edges: HashMap<(u32, u32), i32> = HashMap::with_capacity(2 * triangles.len());
-    for &[a, b, c] in &triangles {
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            // A closed, consistently wound surface uses every edge once in each direction. The 4
-            // counts uses, so that an edge with two uses in each direction is not mistaken for one.
-            let (key, direction) = if from < to {
-                ((from, to), 1)
-            } else {
-                ((to, from), -1)
-            };
-            *edges.entry(key).or_insert(0) += direction + 4;
-        }
-    }
-    if edges.is_empty() || edges.values().any(|&walks| walks != 8) {
+    let triangles = welded_triangles(mesh);
+    let edges = edge_uses(&triangles);
+    if edges.is_empty() || edges.values().any(|uses| *uses != [1, 1]) {
         return Facing::Unknown;
     }
 
@@ -347,17 +328,37 @@ fn find_facing(mesh: &TriMesh) -> Facing {
     }
 }
 
-/// Maps every vertex to the first one at exactly the same position.
-pub(crate) fn weld(vertices: &[Point3<f32>]) -> Vec<u32> {
+/// Returns the triangles with three different positions, over the first vertex at each of them.
+pub(crate) fn welded_triangles(mesh: &TriMesh) -> Vec<[u32; 3]> {
+    let vertices = mesh.vertices();
     let mut first_at: HashMap<[u32; 3], u32> = HashMap::with_capacity(vertices.len());
-    (0_u32..)
+    let welded: Vec<u32> = (0_u32..)
         .zip(vertices)
         .map(|(index, p)| {
             // Adding 0 changes −0 to +0.
             let key = [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
             *first_at.entry(key).or_insert(index)
         })
+        .collect();
+    let triangles = mesh.triangles().iter();
+    triangles
+        .map(|corners| corners.map(|i| welded[i as usize]))
+        .filter(|[a, b, c]| a != b && b != c && c != a)
         .collect()
+}
+
+/// Returns how many triangles use each edge in upward and in downward direction.
+///
+/// A closed, consistently wound surface uses every edge once in each direction.
+pub(crate) fn edge_uses(triangles: &[[u32; 3]]) -> HashMap<(u32, u32), [u32; 2]> {
+    let mut edges: HashMap<(u32, u32), [u32; 2]> = HashMap::with_capacity(2 * triangles.len());
+    for &[a, b, c] in triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let uses = edges.entry((from.min(to), from.max(to))).or_default();
+            uses[usize::from(from > to)] += 1;
+        }
+    }
+    edges
 }
 
 /// The sets of vertices that triangles connect.

@@ -1,8 +1,8 @@
 //! Defects of a mesh that do not prevent its use.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
-use crate::object::mesh::{DisjointSets, TriMesh, weld};
+use crate::object::mesh::{DisjointSets, TriMesh, edge_uses, welded_triangles};
 
 /// Counts of defects of a mesh. Except for `components`, all are 0 for a clean closed mesh.
 ///
@@ -54,35 +54,24 @@ impl TriMesh {
     /// ```
     #[must_use]
     pub fn survey(&self) -> MeshSurvey {
-        let welded = weld(self.vertices());
-        let mut seen = HashSet::with_capacity(self.triangles().len());
-        // For every edge, its uses in upward and in downward direction.
-        let mut edges: HashMap<(u32, u32), [u32; 2]> = HashMap::new();
-        let (mut degenerate, mut duplicate) = (0, 0);
-        for (triangle, corners) in self.triangles().iter().enumerate() {
-            let [a, b, c] = corners.map(|index| welded[index as usize]);
-            degenerate += usize::from(self.triangle_area(triangle) <= 0.0);
-            if a == b || b == c || c == a {
-                continue;
-            }
-            let mut sorted = [a, b, c];
-            sorted.sort_unstable();
-            duplicate += usize::from(!seen.insert(sorted));
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                let walks = edges.entry((from.min(to), from.max(to))).or_default();
-                walks[usize::from(from > to)] += 1;
-            }
-        }
-        let mut parts = DisjointSets::of(self.vertices().len(), &seen);
-        let roots: HashSet<u32> = seen.iter().map(|corners| parts.find(corners[0])).collect();
+        let triangles = welded_triangles(self);
+        let edges = edge_uses(&triangles);
         let count = |matches: fn(&[u32; 2]) -> bool| edges.values().filter(|e| matches(e)).count();
+        let sorted = |mut corners: [u32; 3]| {
+            corners.sort_unstable();
+            corners
+        };
+        let distinct: HashSet<[u32; 3]> = triangles.iter().copied().map(sorted).collect();
+        let mut parts = DisjointSets::of(self.vertices().len(), &triangles);
+        let roots: HashSet<u32> = triangles.iter().map(|[a, ..]| parts.find(*a)).collect();
+        let areas = (0..self.triangles().len()).map(|triangle| self.triangle_area(triangle));
         MeshSurvey {
-            degenerate_triangles: degenerate,
-            duplicate_triangles: duplicate,
+            degenerate_triangles: areas.filter(|area| *area <= 0.0).count(),
+            duplicate_triangles: triangles.len() - distinct.len(),
             unused_vertices: self.used_vertices().iter().filter(|used| !**used).count(),
-            boundary_edges: count(|walks| walks[0] + walks[1] == 1),
-            non_manifold_edges: count(|walks| walks[0] + walks[1] > 2),
-            misoriented_edges: count(|walks| matches!(walks, [2, 0] | [0, 2])),
+            boundary_edges: count(|uses| uses[0] + uses[1] == 1),
+            non_manifold_edges: count(|uses| uses[0] + uses[1] > 2),
+            misoriented_edges: count(|uses| matches!(uses, [2, 0] | [0, 2])),
             components: roots.len(),
         }
     }
