@@ -34,7 +34,6 @@ mod color;
 mod errors;
 mod judgment;
 mod mve;
-mod parts;
 mod score;
 mod tolerances;
 

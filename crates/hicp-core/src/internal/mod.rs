@@ -1,6 +1,7 @@
 //! Helpers that the crates of this workspace share. No stability is promised.
 
 mod background;
+mod disjoint_sets;
 mod index;
 mod label;
 mod noise;
@@ -17,6 +18,7 @@ mod whole;
 mod work;
 
 pub use background::{Background, Surroundings};
+pub use disjoint_sets::DisjointSets;
 pub use index::index;
 pub use label::type_label;
 pub use plane::DepthPlane;
@@ -29,5 +31,5 @@ pub use whole::whole;
 pub use work::Work;
 
 pub use crate::for_tuples;
-pub use crate::object::mesh::{DisjointSets, coordinate_step};
+pub use crate::object::mesh::coordinate_step;
 pub use crate::sensor::image::check_size;

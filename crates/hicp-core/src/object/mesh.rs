@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
+use crate::internal::DisjointSets;
 use crate::object::surface_color::SurfaceColor;
 
 /// Largest accepted absolute vertex coordinate, meters.
@@ -313,10 +314,12 @@ fn find_facing(mesh: &TriMesh) -> Facing {
     let mut parts = DisjointSets::of(mesh.vertices().len(), &triangles);
     // The volume of a closed part does not depend on the origin. One of its own vertices as the
     // origin keeps the sum well conditioned.
-    let mut volumes: HashMap<u32, (Point3<f64>, f64)> = HashMap::new();
+    let mut volumes: HashMap<usize, (Point3<f64>, f64)> = HashMap::new();
     for corners in &triangles {
         let [a, b, c] = corners.map(|i| mesh.vertices()[i as usize].cast::<f64>());
-        let (origin, volume) = volumes.entry(parts.find(corners[0])).or_insert((a, 0.0));
+        let (origin, volume) = volumes
+            .entry(parts.find(corners[0] as usize))
+            .or_insert((a, 0.0));
         *volume += (a - *origin).dot(&(b - *origin).cross(&(c - *origin)));
     }
     if volumes.values().all(|(_, volume)| *volume > 0.0) {
@@ -359,41 +362,6 @@ pub(crate) fn edge_uses(triangles: &[[u32; 3]]) -> HashMap<(u32, u32), [u32; 2]>
         }
     }
     edges
-}
-
-/// The sets of vertices that triangles connect.
-#[derive(Debug)]
-pub struct DisjointSets {
-    parent: Vec<u32>,
-}
-
-impl DisjointSets {
-    /// Connects the corners of each triangle, of `count` vertices.
-    pub fn of<'a>(count: usize, triangles: impl IntoIterator<Item = &'a [u32; 3]>) -> Self {
-        let mut sets = Self {
-            parent: (0_u32..).take(count).collect(),
-        };
-        for &[a, b, c] in triangles {
-            sets.join(a, b);
-            sets.join(b, c);
-        }
-        sets
-    }
-
-    /// Returns the smallest vertex of the set of a vertex.
-    pub fn find(&mut self, mut x: u32) -> u32 {
-        while self.parent[x as usize] != x {
-            let grandparent = self.parent[self.parent[x as usize] as usize];
-            self.parent[x as usize] = grandparent;
-            x = grandparent;
-        }
-        x
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.find(a), self.find(b));
-        self.parent[a.max(b) as usize] = a.min(b);
-    }
 }
 
 /// The reason why vertices and triangles do not form a mesh.

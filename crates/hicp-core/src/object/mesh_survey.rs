@@ -2,7 +2,8 @@
 
 use std::collections::HashSet;
 
-use crate::object::mesh::{DisjointSets, TriMesh, edge_uses, welded_triangles};
+use crate::internal::DisjointSets;
+use crate::object::mesh::{TriMesh, edge_uses, welded_triangles};
 
 /// Counts of defects of a mesh. Except for `components`, all are 0 for a clean closed mesh.
 ///
@@ -63,7 +64,8 @@ impl TriMesh {
         };
         let distinct: HashSet<[u32; 3]> = triangles.iter().copied().map(sorted).collect();
         let mut parts = DisjointSets::of(self.vertices().len(), &triangles);
-        let roots: HashSet<u32> = triangles.iter().map(|[a, ..]| parts.find(*a)).collect();
+        let first = triangles.iter().map(|[a, ..]| *a as usize);
+        let roots: HashSet<usize> = first.map(|vertex| parts.find(vertex)).collect();
         let areas = (0..self.triangles().len()).map(|triangle| self.triangle_area(triangle));
         MeshSurvey {
             degenerate_triangles: areas.filter(|area| *area <= 0.0).count(),

@@ -1,7 +1,8 @@
 //! The separation of cells inside a measured surface from those that it hides.
 
+use hicp_core::internal::DisjointSets;
+
 use crate::judgment::grid::{CELLS, Cell, Grid};
-use crate::parts::Parts;
 
 /// Steepest slope of a continuous surface against the image plane, depth per width.
 const STEEPEST: f32 = 3.0;
@@ -26,7 +27,7 @@ pub(crate) fn find_insides(grid: &mut Grid) {
         }
     }
     let hidden = || hidden[..count].iter().map(|index| usize::from(*index));
-    let mut parts = Parts::new([0; CELLS]);
+    let mut parts = DisjointSets::new([0; CELLS]);
     for index in hidden() {
         // The neighbors to the right and below: each pair once.
         for other in [Grid::SIDES[0], Grid::SIDES[2]].map(|side| Grid::offset(index, side)) {

@@ -1,6 +1,6 @@
 //! The surfaces in an imperfect mask, separated by steps in depth.
 
-use crate::parts::Parts;
+use hicp_core::internal::DisjointSets;
 
 /// Share of its contact with the border of the mask over which another object continues.
 const CONTINUES: f32 = 0.5;
@@ -86,7 +86,7 @@ pub(crate) fn trust_surfaces(
         })
         .collect();
     let connected = |a: usize, b: usize| (shown[a] - shown[b]).abs() < step;
-    let mut parts = Parts::new(vec![0; masked.len()]);
+    let mut parts = DisjointSets::new(vec![0; masked.len()]);
     cells.for_pairs(|a, b| {
         if connected(a, b) & masked[a] & masked[b] {
             parts.join(a, b);

@@ -29,7 +29,7 @@ pub fn components(mesh: &TriMesh) -> Result<Vec<Component>, MeshError> {
     let mut number: Vec<Option<usize>> = vec![None; mesh.vertices().len()];
     let mut triangles: Vec<Vec<[u32; 3]>> = Vec::new();
     for corners in mesh.triangles() {
-        let part = parts.find(corners[0]) as usize;
+        let part = parts.find(corners[0] as usize);
         let number = *number[part].get_or_insert_with(|| {
             triangles.push(Vec::new());
             triangles.len() - 1
