@@ -76,7 +76,7 @@ impl Observation {
         mask: Mask,
         camera: PinholeCamera,
     ) -> Result<Self, ImageError> {
-        Self::of_shared(depth.into(), mask, camera, NormalWindow::Automatic)
+        Self::with_normal_window(depth, mask, camera, NormalWindow::Automatic)
     }
 
     /// Creates an observation as [`Observation::new`] does, with another window for its normals.
@@ -101,21 +101,12 @@ impl Observation {
         depth: impl Into<Arc<DepthImage>>,
         mask: Mask,
         camera: PinholeCamera,
-        window: NormalWindow,
-    ) -> Result<Self, ImageError> {
-        Self::of_shared(depth.into(), mask, camera, window)
-    }
-
-    fn of_shared(
-        depth: Arc<DepthImage>,
-        mask: Mask,
-        camera: PinholeCamera,
         normal_window: NormalWindow,
     ) -> Result<Self, ImageError> {
+        let depth = depth.into();
         normal_window.check()?;
         check_size("mask", mask.size(), "depth image", depth.size())?;
         check_size("camera", camera.size(), "depth image", depth.size())?;
-
         Ok(Self {
             id: Id::next(),
             camera,
@@ -358,16 +349,14 @@ impl Observation {
     /// corner, so equal strides select equal pixels for every mask. A stride of 0 counts as 1.
     pub fn surfels(&self, stride: u32) -> impl Iterator<Item = (u32, &Surfel)> {
         let stride = stride.max(1);
-        let (region, width) = (self.region, self.region.width());
-        let (step, surfels) = (stride as usize, self.surfel_map());
-        (region.v_min.next_multiple_of(stride)..region.v_max)
-            .step_by(step)
-            .flat_map(move |v| {
-                let row = (v - region.v_min) as usize * width;
-                (region.u_min.next_multiple_of(stride)..region.u_max)
-                    .step_by(step)
-                    .map(move |u| row + (u - region.u_min) as usize)
-            })
+        let (region, surfels) = (self.region, self.surfel_map());
+        let grid = PixelRegion {
+            u_min: region.u_min.next_multiple_of(stride),
+            v_min: region.v_min.next_multiple_of(stride),
+            ..region
+        };
+        grid.grid(stride as usize)
+            .filter_map(move |(u, v)| region.index(u, v))
             .map(|index| (internal::index(index), &surfels[index]))
             .filter(|(_, s)| s.point.z > 0.0)
     }
@@ -408,8 +397,6 @@ impl Observation {
             u_max: self.region.u_max.div_ceil(factor),
             v_max: self.region.v_max.div_ceil(factor),
         };
-        let pixels = depth.iter().zip(&mask);
-        let n_measured = pixels.filter(|(z, masked)| **masked && **z > 0.0).count();
         let camera = self.camera.scaled_down(factor);
         let (Ok(depth), Ok(mask)) = (
             DepthImage::from_meters(width, height, depth),
@@ -420,6 +407,7 @@ impl Observation {
         Self {
             id: Id::next(),
             camera,
+            n_measured: n_measured(&depth, &mask),
             depth: Arc::new(depth),
             // Color is used at full resolution only.
             color: None,
@@ -427,15 +415,8 @@ impl Observation {
             region,
             normal_window: self.normal_window,
             surfels: Arc::default(),
-            n_measured,
-            // Without its derived values, of which this observation is one.
-            fine: Some((
-                Box::new(Self {
-                    derived: Derived::default(),
-                    ..self.clone()
-                }),
-                factor,
-            )),
+            // A clone is without derived values, of which this observation is one.
+            fine: Some((Box::new(self.clone()), factor)),
             derived: Derived::default(),
         }
     }
