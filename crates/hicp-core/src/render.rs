@@ -108,17 +108,9 @@ impl RenderedView {
         camera: &PinholeCamera,
         camera_from_object: &Isometry3<f64>,
     ) -> Option<Surfel> {
-        let index = self.region.index(u, v)?;
-        let depth = self.depth[index];
-        if depth <= 0.0 {
-            return None;
-        }
-        let triangle = self.triangles[index] as usize;
-        if triangle >= mesh.triangles().len() {
-            return None;
-        }
+        let (triangle, depth) = self.seen_at(u, v, mesh)?;
         let normal = mesh.normal(triangle)?;
-        let point = camera.unproject(f64::from(u), f64::from(v), f64::from(depth));
+        let point = camera.unproject(f64::from(u), f64::from(v), depth);
         let normal = camera_from_object.rotation * normal.cast::<f64>().into_inner();
         let facing = if normal.dot(&point.coords) > 0.0 {
             -normal
@@ -130,9 +122,7 @@ impl RenderedView {
             normal: UnitVector3::new_unchecked(facing.cast::<f32>()),
         })
     }
-}
 
-impl RenderedView {
     /// Returns the color of the rendered surface at an image pixel: red, green and blue, 0 to 255.
     ///
     /// Returns `None` if nothing was rendered there, if the mesh has no color, or as for
@@ -147,12 +137,7 @@ impl RenderedView {
         camera: &PinholeCamera,
         camera_from_object: &Isometry3<f64>,
     ) -> Option<[f32; 3]> {
-        let index = self.region.index(u, v)?;
-        let triangle = self.triangles[index] as usize;
-        if triangle >= mesh.triangles().len() {
-            return None;
-        }
-        let depth = f64::from(self.depth[index]);
+        let (triangle, depth) = self.seen_at(u, v, mesh)?;
         let point = camera.unproject(f64::from(u), f64::from(v), depth);
         let point = camera_from_object.inverse_transform_point(&point);
         let [a, b, c] = mesh.corners(triangle).map(|corner| corner.cast::<f64>());
@@ -167,6 +152,15 @@ impl RenderedView {
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
         let weights = [1.0 - second - third, second, third].map(|weight| weight as f32);
         mesh.color_at(triangle, weights)
+    }
+
+    /// Returns the triangle of `mesh` that an image pixel shows, and its depth there, meters.
+    #[inline]
+    fn seen_at(&self, u: u32, v: u32, mesh: &TriMesh) -> Option<(usize, f64)> {
+        let index = self.region.index(u, v)?;
+        let (triangle, depth) = (self.triangles[index] as usize, self.depth[index]);
+        let seen = depth > 0.0 && triangle < mesh.triangles().len();
+        seen.then_some((triangle, f64::from(depth)))
     }
 }
 
@@ -241,11 +235,12 @@ const CACHED_VIEWS: usize = 4;
 /// hit returns exactly what a render would.
 pub struct RenderCache {
     renderer: Box<dyn Renderer + Send>,
-    entries: Vec<Entry>,
+    entries: [Entry; CACHED_VIEWS],
     clock: u64,
     rendered: u64,
 }
 
+#[derive(Default)]
 struct Entry {
     key: Option<Key>,
     view: RenderedView,
@@ -264,13 +259,7 @@ impl RenderCache {
     pub fn new(renderer: impl Renderer + Send + 'static) -> Self {
         Self {
             renderer: Box::new(renderer),
-            entries: (0..CACHED_VIEWS)
-                .map(|_| Entry {
-                    key: None,
-                    view: RenderedView::default(),
-                    last_used: 0,
-                })
-                .collect(),
+            entries: Default::default(),
             clock: 0,
             rendered: 0,
         }
@@ -292,18 +281,10 @@ impl RenderCache {
             pose: pose_bits(camera_from_object),
         };
         self.clock += 1;
-        let mut chosen = 0;
-        let mut hit = false;
-        for (index, entry) in self.entries.iter().enumerate() {
-            if entry.key == Some(key) {
-                (chosen, hit) = (index, true);
-                break;
-            }
-            if entry.last_used < self.entries[chosen].last_used {
-                chosen = index;
-            }
-        }
-        if !hit {
+        let hit = self.entries.iter().position(|entry| entry.key == Some(key));
+        let oldest = || (0..CACHED_VIEWS).min_by_key(|index| self.entries[*index].last_used);
+        let chosen = hit.or_else(oldest).unwrap_or_default();
+        if hit.is_none() {
             self.rendered += 1;
             // Invalidate the key first: if the renderer panics, a half-filled view must not be
             // reused.
