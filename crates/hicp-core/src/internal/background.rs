@@ -76,7 +76,7 @@ impl Background {
         let near = LEAST_HEIGHT_METERS.max(2.5 * noise);
         let near_plane = |plane: DepthPlane| {
             let pixels = ring.iter().copied();
-            pixels.filter(move |pixel| height(&plane, pixel).abs() < near)
+            pixels.filter(move |p| (plane.depth(p.x, p.y) - p.z).abs() < near)
         };
         let support = |plane: &DepthPlane| near_plane(*plane).count();
         let mut plane = DepthPlane::through_three(&ring, TRIES).max_by_key(support)?;
@@ -94,7 +94,7 @@ impl Background {
     #[must_use]
     #[inline]
     pub fn height(&self, u: f64, v: f64, z: f64) -> f64 {
-        height(&self.plane, &Vector3::new(u, v, z))
+        self.plane.depth(u, v) - z
     }
 
     /// Returns the certainty that each of some pixels is not on the plane, 0 to 1.
@@ -116,9 +116,8 @@ impl Background {
                 sums.push(line);
             }
             if z > 0.0 {
-                let pixel = Vector3::new(f64::from(u), f64::from(v), f64::from(z));
-                let height = height(&self.plane, &pixel).clamp(-1.0, 1.0);
-                line = (line.0 + height, line.1 + 1);
+                let height = self.height(u.into(), v.into(), z.into());
+                line = (line.0 + height.clamp(-1.0, 1.0), line.1 + 1);
             }
             let above: (f64, u32) = sums[sums.len() - width - 1];
             sums.push((above.0 + line.0, above.1 + line.1));
@@ -145,16 +144,5 @@ impl Background {
             }
         }
         off
-    }
-}
-
-/// Returns the distance of a pixel (u, v, z) in front of a plane, along the optical axis, meters.
-#[inline]
-fn height(plane: &DepthPlane, pixel: &Vector3<f64>) -> f64 {
-    let inverse = plane.inverse_depth(pixel.x, pixel.y);
-    if inverse > 0.0 {
-        1.0 / inverse - pixel.z
-    } else {
-        f64::INFINITY
     }
 }

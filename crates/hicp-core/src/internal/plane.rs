@@ -43,4 +43,16 @@ impl DepthPlane {
     pub fn inverse_depth(&self, u: f64, v: f64) -> f64 {
         self.0.dot(&Vector3::new(1.0, u, v))
     }
+
+    /// Returns the depth of the plane at a pixel; infinite behind the camera.
+    #[must_use]
+    #[inline]
+    pub fn depth(&self, u: f64, v: f64) -> f64 {
+        let inverse = self.inverse_depth(u, v);
+        if inverse > 0.0 {
+            1.0 / inverse
+        } else {
+            f64::INFINITY
+        }
+    }
 }

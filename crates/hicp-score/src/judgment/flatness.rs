@@ -204,10 +204,5 @@ fn from_plane(pixels: &[Pixel], depth: impl Fn(&Pixel) -> f64, scratch: &mut [f6
 ///
 /// It is infinite if the plane is not in front of the camera.
 fn distance(plane: &DepthPlane, pixel: &Pixel, z: f64) -> f64 {
-    let inverse = plane.inverse_depth(pixel.u, pixel.v);
-    if inverse > 0.0 {
-        (z - 1.0 / inverse).abs()
-    } else {
-        f64::INFINITY
-    }
+    (z - plane.depth(pixel.u, pixel.v)).abs()
 }
