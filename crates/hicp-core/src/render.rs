@@ -329,7 +329,9 @@ impl std::fmt::Debug for RenderCache {
     }
 }
 
-fn pose_bits(pose: &Isometry3<f64>) -> [u64; 7] {
+/// Returns the bits of a pose, which are equal if it is, also with a NaN.
+#[must_use]
+pub fn pose_bits(pose: &Isometry3<f64>) -> [u64; 7] {
     let (t, q) = (&pose.translation.vector, &pose.rotation.coords);
     [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
 }

@@ -32,4 +32,5 @@ pub use work::Work;
 
 pub use crate::for_tuples;
 pub use crate::object::mesh::coordinate_step;
+pub use crate::render::pose_bits;
 pub use crate::sensor::image::check_size;

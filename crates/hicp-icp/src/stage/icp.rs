@@ -1,6 +1,7 @@
 //! Algorithm 1: generic ICP.
 
 use hicp_association::{DataAssociation, OutlierFilter, PointSelection};
+use hicp_core::internal::pose_bits;
 use hicp_core::{Context, Isometry3, Iteration, Problem, se3};
 use hicp_metric::Minimize;
 
@@ -174,7 +175,8 @@ where
         let outcome = Outcome {
             camera_from_object: pose,
             termination,
-            verdict: if same_bits(&pose, init) {
+            // By value, a pose with a NaN would differ from itself.
+            verdict: if pose_bits(&pose) == pose_bits(init) {
                 Verdict::KeptInitial(termination)
             } else {
                 Verdict::Refined
@@ -208,14 +210,4 @@ struct Accepted<'a> {
     camera_from_object: Isometry3<f64>,
     evaluation: Evaluation,
     iteration: Iteration<'a>,
-}
-
-/// Returns whether two poses are equal to the bit. By value, a pose with a NaN would differ from
-/// itself.
-fn same_bits(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
-    let coordinates = |pose: &Isometry3<f64>| {
-        let (t, q) = (pose.translation.vector, pose.rotation.coords);
-        [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
-    };
-    coordinates(a) == coordinates(b)
 }
