@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
+use crate::internal::bounds;
 use crate::object::model::Model;
 use crate::object::sampling::sample_surface;
 use crate::surfel::Surfel;
@@ -104,9 +105,8 @@ impl Sides {
         let (direction, side) = &self.sides[nearest];
         side.get_or_init(|| {
             let surfels = self.seen_from(direction);
-            let sum = (surfels.iter()).fold(Vector3::zeros(), |sum: Vector3<f64>, surfel| {
-                sum + surfel.point.coords.cast::<f64>()
-            });
+            let places = surfels.iter().map(|s| s.point.coords.cast::<f64>());
+            let sum: Vector3<f64> = places.sum();
             let centroid = match surfels.len() {
                 0 => self.center,
                 count => Point3::from(sum / count as f64),
@@ -128,24 +128,16 @@ impl Sides {
             .to_rotation_matrix();
         let faces = |s: &&Surfel| !self.oriented || s.normal.dot(direction) > 0.0;
         let facing = self.samples.iter().filter(faces);
-        let seen: Vec<(Vector3<f32>, &Surfel)> = facing
-            .map(|sample| (turn * sample.point.coords, sample))
-            .collect();
-        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for (place, _) in &seen {
-            for axis in 0..2 {
-                low[axis] = low[axis].min(place[axis]);
-                high[axis] = high[axis].max(place[axis]);
-            }
-        }
-        let extent = [high[0] - low[0], high[1] - low[1]];
+        let seen: Vec<(Point3<f32>, &Surfel)> =
+            facing.map(|sample| (turn * sample.point, sample)).collect();
+        let Some([low, high]) = bounds(seen.iter().map(|(place, _)| *place)) else {
+            return Vec::new();
+        };
+        let low = [low.x, low.y];
+        let extent = [high.x - low[0], high.y - low[1]];
         let longer = extent[0].max(extent[1]);
-        if longer.is_nan() || longer <= SPECK {
-            return seen
-                .first()
-                .map(|(_, surfel)| **surfel)
-                .into_iter()
-                .collect();
+        if longer <= SPECK {
+            return vec![*seen[0].1];
         }
         let coarse = Grid::new(low, extent, longer / COARSE);
         let mut occupied = vec![0_u8; coarse.cells()];
@@ -194,7 +186,7 @@ impl Grid {
     }
 
     /// Returns the cell of a place, and the square of its distance from the middle, in cells.
-    fn cell(&self, place: &Vector3<f32>) -> (usize, f32) {
+    fn cell(&self, place: &Point3<f32>) -> (usize, f32) {
         let [x, y] = [0, 1].map(|axis| (place[axis] - self.low[axis]) / self.cell);
         let (column, row) = (whole(x).min(self.columns - 1), whole(y).min(self.rows - 1));
         let off = (x - column as f32 - 0.5).powi(2) + (y - row as f32 - 0.5).powi(2);
@@ -203,7 +195,7 @@ impl Grid {
 
     /// Returns one surfel per occupied cell: of those at most `front` behind the foremost one, the
     /// nearest to the middle.
-    fn choose(&self, seen: &[(Vector3<f32>, &Surfel)], front: f32) -> Vec<Surfel> {
+    fn choose(&self, seen: &[(Point3<f32>, &Surfel)], front: f32) -> Vec<Surfel> {
         let mut foremost = vec![f32::NEG_INFINITY; self.cells()];
         for (place, _) in seen {
             let foremost = &mut foremost[self.cell(place).0];

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 /// Number of rotations into which BOP divides a continuous symmetry: ⌈π/0.01⌉.
 pub const CONTINUOUS_STEPS: usize = 315;
@@ -81,8 +81,7 @@ impl SymmetryAxis {
     #[must_use]
     pub fn rotation(&self, angle: f64) -> Isometry3<f64> {
         let rotation = UnitQuaternion::from_axis_angle(&self.direction, angle);
-        let offset = self.offset.coords;
-        Isometry3::from_parts(Translation3::from(offset - rotation * offset), rotation)
+        Isometry3::rotation_wrt_point(rotation, self.offset)
     }
 }
 

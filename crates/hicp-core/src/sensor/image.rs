@@ -379,18 +379,12 @@ fn bounding_region(mask: &Raster<bool>) -> PixelRegion {
         let set = |u: &u32| row[*u as usize];
         let first = (0..mask.width).find(set).unwrap_or(0);
         let last = (0..mask.width).rfind(set).unwrap_or(first);
-        if region.is_empty() {
-            region = PixelRegion {
-                u_min: first,
-                v_min: v,
-                u_max: last + 1,
-                v_max: v + 1,
-            };
-        } else {
-            region.u_min = region.u_min.min(first);
-            region.u_max = region.u_max.max(last + 1);
-            region.v_max = v + 1;
-        }
+        region = region.union(&PixelRegion {
+            u_min: first,
+            v_min: v,
+            u_max: last + 1,
+            v_max: v + 1,
+        });
     }
     region
 }

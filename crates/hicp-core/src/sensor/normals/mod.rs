@@ -128,14 +128,9 @@ fn relative_noise(patch: &DepthPatch<'_>) -> f64 {
     let (width, depth) = (patch.region.width(), patch.pixels());
     let step = depth.len().saturating_sub(2) / NOISE_SAMPLES + 1;
     let mut differences = Vec::with_capacity(NOISE_SAMPLES);
-    let mut u = 0;
-    for z in depth.windows(3).step_by(step) {
-        if u + 2 < width && z[0] > 0.0 && z[1] > 0.0 && z[2] > 0.0 {
+    for (index, z) in depth.windows(3).enumerate().step_by(step) {
+        if index % width + 2 < width && z[0] > 0.0 && z[1] > 0.0 && z[2] > 0.0 {
             differences.push(((z[0] - 2.0 * z[1] + z[2]) / z[1]).abs());
-        }
-        u += step;
-        while u >= width {
-            u -= width;
         }
     }
     let median = median(&mut differences, f32::total_cmp).unwrap_or(0.0);
