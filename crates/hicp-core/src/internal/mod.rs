@@ -24,7 +24,7 @@ pub use label::type_label;
 pub use plane::DepthPlane;
 pub use scratch::Scratch;
 pub use seen_colors::{ColorSamples, FacingSample, SeenColors, faces_camera};
-pub use statistics::{bounds, median};
+pub use statistics::{bounds, centroid, median};
 pub use suggest::{named, nearest_name};
 pub use vectorized::{VectorLoop, stored, vectorized};
 pub use whole::whole;

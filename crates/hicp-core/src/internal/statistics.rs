@@ -2,7 +2,9 @@
 
 use std::cmp::Ordering;
 
-use nalgebra::{Point3, RealField};
+use nalgebra::{Point3, RealField, Vector3};
+
+use crate::surfel::Surfel;
 
 /// Returns the median: of an even number of values, the upper of the two middle ones.
 ///
@@ -18,4 +20,14 @@ pub fn bounds<T: RealField + Copy>(
 ) -> Option<[Point3<T>; 2]> {
     let both = points.into_iter().map(|point| [point; 2]);
     both.reduce(|[low, high], [point, _]| [low.inf(&point), high.sup(&point)])
+}
+
+/// Returns the mean of the points of surfels, or `None` without surfels.
+pub fn centroid<'a>(surfels: impl IntoIterator<Item = &'a Surfel>) -> Option<Point3<f64>> {
+    let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+    for surfel in surfels {
+        sum += surfel.point.coords.cast::<f64>();
+        count += 1.0;
+    }
+    (count > 0.0).then(|| Point3::from(sum / count))
 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
-use crate::internal::bounds;
+use crate::internal::{bounds, centroid};
 use crate::object::model::Model;
 use crate::object::sampling::sample_surface;
 use crate::surfel::Surfel;
@@ -105,16 +105,10 @@ impl Sides {
         let (direction, side) = &self.sides[nearest];
         side.get_or_init(|| {
             let surfels = self.seen_from(direction);
-            let places = surfels.iter().map(|s| s.point.coords.cast::<f64>());
-            let sum: Vector3<f64> = places.sum();
-            let centroid = match surfels.len() {
-                0 => self.center,
-                count => Point3::from(sum / count as f64),
-            };
             Side {
                 index: nearest,
+                centroid: centroid(&surfels).unwrap_or(self.center),
                 surfels,
-                centroid,
             }
         })
     }

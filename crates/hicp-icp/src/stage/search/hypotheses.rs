@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use hicp_core::internal::centroid;
 use hicp_core::{
     Isometry3, Model, Observation, Point3, Problem, Sides, Translation3, UnitQuaternion,
     UnitVector3, Vector3, rotation_grid, se3, so3,
@@ -48,7 +49,7 @@ impl<'a> Hypotheses<'a> {
         bound: Option<Bound>,
     ) -> Option<Self> {
         let (model, observation) = problem.sides()?;
-        let centroid = centroid(observation)?;
+        let centroid = observed_centroid(observation)?;
         let ray = centroid.coords.try_normalize(f64::EPSILON)?;
         se3::is_finite(init).then(|| Self {
             model,
@@ -190,18 +191,11 @@ impl<'a> Hypotheses<'a> {
 }
 
 /// Returns the mean of about 1000 of the observed points, in the camera frame.
-fn centroid(observation: &Observation) -> Option<Point3<f64>> {
+fn observed_centroid(observation: &Observation) -> Option<Point3<f64>> {
     let stride = (1_u32..)
         .find(|s| observation.n_surfels() <= 1000 * (*s as usize).pow(2))
         .unwrap_or(1);
-    let mean = |stride: u32| {
-        let (mut sum, mut count) = (Vector3::zeros(), 0.0);
-        for (_, surfel) in observation.surfels(stride) {
-            sum += surfel.point.coords.cast::<f64>();
-            count += 1.0;
-        }
-        (count > 0.0).then(|| Point3::from(sum / count))
-    };
+    let mean = |stride: u32| centroid(observation.surfels(stride).map(|(_, surfel)| surfel));
     mean(stride).or_else(|| mean(1))
 }
 

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use hicp_core::internal::small::eigen3;
-use hicp_core::internal::{VectorLoop, vectorized};
+use hicp_core::internal::{VectorLoop, centroid, vectorized};
 use hicp_core::{
-    Isometry3, Matrix3, Model, Observation, Point3, Surfel, TriMesh, UnitQuaternion, UnitVector3,
-    Vector3,
+    Isometry3, Matrix3, Model, Observation, Surfel, TriMesh, UnitQuaternion, UnitVector3, Vector3,
 };
 
 use crate::stage::search::distinct::Distinct;
@@ -237,7 +236,7 @@ fn align(
     rotation: &UnitQuaternion<f64>,
     tolerance: f32,
 ) -> Option<Isometry3<f64>> {
-    let center = mean(samples);
+    let center = centroid(samples)?;
     let shift = center - rotation * center;
     let mut moved = Moved::new(&Isometry3::from_parts(shift.into(), *rotation));
     for alignment in 0..ALIGNMENTS {
@@ -368,9 +367,4 @@ impl VectorLoop for Nearest<'_> {
         let found = nearest < self.limit;
         found.then(|| distances.iter().position(|d| *d == nearest))?
     }
-}
-
-fn mean(samples: &[Surfel]) -> Point3<f64> {
-    let sum: Vector3<f64> = samples.iter().map(|s| s.point.coords.cast::<f64>()).sum();
-    Point3::from(sum / samples.len().max(1) as f64)
 }

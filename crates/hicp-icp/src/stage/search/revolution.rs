@@ -1,7 +1,7 @@
 //! The axis of the part of an object that is a surface of revolution.
 
-use hicp_core::internal::median;
 use hicp_core::internal::small::{eigen3, inverse3};
+use hicp_core::internal::{centroid, median};
 use hicp_core::{Matrix3, Surfel, UnitVector3, Vector3};
 
 /// Number of fits, each to the samples that agree with the last one.
@@ -20,19 +20,15 @@ const LEAST_SHARE: f64 = 0.6;
 ///
 /// Returns `None` if fewer than 60 % of the samples agree. Cost: O(samples), twelve times.
 pub(crate) fn axis_of(samples: &[Surfel], diameter: f64) -> Option<UnitVector3<f64>> {
-    let sum: Vector3<f64> = samples.iter().map(|s| s.point.coords.cast::<f64>()).sum();
-    let center = sum / samples.len().max(1) as f64;
+    let center = centroid(samples)?;
     let lines: Vec<_> = samples
         .iter()
         .map(|sample| {
             let normal = sample.normal.into_inner().cast::<f64>();
-            let point = (sample.point.coords.cast::<f64>() - center) / diameter;
+            let point = (sample.point.cast::<f64>() - center) / diameter;
             (point.cross(&normal), normal)
         })
         .collect();
-    if lines.is_empty() {
-        return None;
-    }
     let mut limit = f64::INFINITY;
     let mut deviations = vec![0.0; lines.len()];
     // A surface that all normals leave free to shift, such as a tube, does not shift.
