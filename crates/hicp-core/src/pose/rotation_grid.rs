@@ -2,7 +2,7 @@
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
-/// The real root of ψ⁴ = ψ + 4, which spreads the second angle of the spiral.
+/// The positive root of ψ⁴ = ψ + 4, which spreads the second angle of the spiral.
 const PSI: f64 = 1.533_751_168_755_204_3;
 
 /// Returns the `index`-th of `count` rotations that cover SO(3) evenly.
@@ -46,7 +46,6 @@ mod tests {
     ///
     /// With s = i + ½, r² = s/n, R² = 1 − s/n, α = 2πs/√2 and β = 2πs/ψ: (x, y, z, w) = (r sin α, r
     /// cos α, R sin β, R cos β).
-    /// α = 2πs/√2 and β = 2πs/ψ.
     #[test]
     fn the_grid_is_the_published_spiral() {
         assert!((PSI.powi(4) - PSI - 4.0).abs() < 1e-14);

@@ -143,8 +143,8 @@ fn q_matrix(xi: &Vector6<f64>) -> Matrix3<f64> {
             (2.0 * a - 3.0 * s + a * c) / (2.0 * a2 * a2 * a),
         )
     };
-    // With s = φ·ρ and c = φ×ρ, the products become outer products: PR = ρφᵀ − sI, RP = φρᵀ − sI,
-    // PRP = −sP, PPR − (…)ᵀ = (φ×c)^.
+    // With P = φ^, R = ρ^ and s = φ·ρ, the products become outer products and skew matrices:
+    // PR = ρφᵀ − sI, RP = φρᵀ − sI, PRP = −sP, PPR + RPP = (φ×(φ×ρ) − 2sφ)^.
     let s = phi.dot(&rho);
     let skew = rho * 0.5 + phi * (s * (m2 - m1)) + phi.cross(&phi.cross(&rho)) * m2;
     let outer = rho * phi.transpose() * m1;

@@ -2,7 +2,7 @@
 
 use super::edges::Edges;
 use super::lanes::LANES;
-use super::patch::{DepthPatch, MIN_DEPTH_METERS};
+use super::patch::{DepthPatch, MIN_FITTED_METERS};
 use super::plane_fits::PlaneFits;
 use super::row::Row;
 use super::size::EDGE_RADIUS;
@@ -32,7 +32,7 @@ impl VectorLoop for FitGated<'_, '_> {
         let (patch, v) = (self.row.patch, self.row.v);
         let depth = patch.row(v);
         for u in self.edges.near.columns(v, depth.len()) {
-            if depth[u] >= MIN_DEPTH_METERS {
+            if depth[u] >= MIN_FITTED_METERS {
                 let window = Window::around(patch, u, v, self.radius);
                 let sums = self.sums(&window, window.joined(self.edges));
                 let at = [(u - window.left) as f64, (v - window.top) as f64];
@@ -76,7 +76,7 @@ impl FitGated<'_, '_> {
                 };
                 let gate = self.edge_step * center * (0.5 + 0.5 * reach);
                 let used = (bits >> lane & 1 != 0)
-                    & (z[lane] >= MIN_DEPTH_METERS)
+                    & (z[lane] >= MIN_FITTED_METERS)
                     & ((z[lane] - center).abs() <= gate);
                 // All bits are set where the pixel is used.
                 let mask = u32::from(used).wrapping_neg();

@@ -10,7 +10,7 @@ use crate::sensor::region::PixelRegion;
 ///
 /// In the sums of a window, the rounding errors of their large inverses would exceed the inverse
 /// depths of the other pixels.
-pub(super) const MIN_DEPTH_METERS: f32 = 1e-4;
+pub(super) const MIN_FITTED_METERS: f32 = 1e-4;
 
 /// Depth inside a mask's bounding box in meters, row-major. Unused pixels are 0.
 pub(crate) struct DepthPatch<'a> {

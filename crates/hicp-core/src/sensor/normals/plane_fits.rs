@@ -3,7 +3,7 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 use super::lanes::{LANES, Lanes};
-use super::patch::MIN_DEPTH_METERS;
+use super::patch::MIN_FITTED_METERS;
 use super::row::{Rays, Row};
 use crate::internal::{VectorLoop, vectorized};
 use crate::surfel::Surfel;
@@ -166,7 +166,7 @@ impl VectorLoop for Solve<'_, '_> {
             let (x, z) = (fits.x[i] as f32, depth[u]);
             let (nx, ny, nz) = (nx[i], ny[i], nz[i]);
             let has_normal = (nx != 0.0) | (ny != 0.0) | (nz != 0.0);
-            row.surfels[u] = if has_normal & (z >= MIN_DEPTH_METERS) {
+            row.surfels[u] = if has_normal & (z >= MIN_FITTED_METERS) {
                 surfel_of([x * z, y * z, z, nx, ny, nz])
             } else {
                 Surfel::NOTHING

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::lanes::{LANES, Lanes, lanes};
-use super::patch::{DepthPatch, MIN_DEPTH_METERS};
+use super::patch::{DepthPatch, MIN_FITTED_METERS};
 use super::plane_fits::{PlaneFits, surfel_of};
 use super::row::Row;
 use crate::internal::{VectorLoop, vectorized};
@@ -126,7 +126,7 @@ fn slide_places(
     let len = added.len();
     let (removed, n) = (&removed[..len], &mut n[..len]);
     let (v, vv) = (&mut v[..len], &mut vv[..len]);
-    let one = |z: f32| if z >= MIN_DEPTH_METERS { 1.0 } else { 0.0 };
+    let one = |z: f32| if z >= MIN_FITTED_METERS { 1.0 } else { 0.0 };
     // Relative to the new center, one row below the last one.
     let (new, old) = (radius, -radius - 1.0);
     for u in 0..len {
@@ -151,8 +151,8 @@ fn slide_inverse(
     let (w, vw) = (&mut w[..len], &mut vw[..len]);
     for u in 0..len {
         let quotient = 1.0 / f64::from(added[u]);
-        let is_removed = removed[u] >= MIN_DEPTH_METERS;
-        let add = if added[u] >= MIN_DEPTH_METERS {
+        let is_removed = removed[u] >= MIN_FITTED_METERS;
+        let add = if added[u] >= MIN_FITTED_METERS {
             quotient
         } else {
             0.0
