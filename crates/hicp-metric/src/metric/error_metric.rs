@@ -92,12 +92,10 @@ pub trait ErrorMetric {
     /// The provided method sums the rows of [`ErrorMetric::linearize`] around the centroid, with
     /// lengths scaled by the RMS radius.
     fn linearize_all(&self, pairs: &Correspondences) -> Option<NormalEquations> {
-        let system = vectorized(Linearize {
+        vectorized(Linearize {
             metric: self,
             pairs: pairs.as_slice(),
-        })?;
-        // Sources were checked with the centroid. This check covers targets and normals.
-        system.loss().is_finite().then_some(system)
+        })
     }
 
     /// Computes one step of minimization over all pairs.
@@ -107,7 +105,7 @@ pub trait ErrorMetric {
     fn step(&self, pairs: &Correspondences) -> Option<Step> {
         let system = self.linearize_all(pairs)?;
         let sum = || pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
-        let weight: f64 = system.weight().unwrap_or_else(sum);
+        let weight: f64 = system.weight.unwrap_or_else(sum);
         let mean_loss = system.loss() / weight;
         let increment = system.solve()?;
         mean_loss.is_finite().then_some(Step {
@@ -136,13 +134,12 @@ impl<M: ErrorMetric + ?Sized> VectorLoop for Linearize<'_, M> {
         // One pass: the sums are relative to a nearby point first, and then moved to the centroid
         // and scaled by the radius.
         let mut moments = Moments::about_first(self.pairs)?;
-        let mut system = NormalEquations::new(moments.origin(), 1.0);
+        let mut system = NormalEquations::new(moments.origin, 1.0);
         for pair in self.pairs {
             moments.add(pair);
             self.metric.linearize(pair, &mut system);
         }
-        let (pivot, length) = moments.pivot_and_length()?;
-        Some(system.moved_to(pivot, length, moments.weight()))
+        system.centered(&moments)
     }
 }
 

@@ -3,6 +3,7 @@
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Translation3, Vector3, so3};
 
 use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::system::moments::length_of;
 use crate::system::normal_equations::NormalEquations;
 
 /// E = (nᵀ (T^½ o − T^{−½} c))², where n = (n_o + n_c)/2 is the mean of both normals.
@@ -97,13 +98,8 @@ impl ErrorMetric for Symmetric {
         // rows have no solution.
         let (source_mean, target_mean) = (source_sum / weight, target_sum / weight);
         let variance = squares / weight - source_mean.norm_squared();
-        let length = if variance > 1e-12 {
-            variance.sqrt()
-        } else {
-            1.0
-        };
         let middle = (source_mean + target_mean) * 0.5;
-        let mut system = NormalEquations::new(Point3::origin(), length);
+        let mut system = NormalEquations::new(Point3::origin(), length_of(variance));
         for (source, target, normal, residual, w) in counting() {
             // The unknowns are u = t' + (q̄ − p̄) and 2a. Undetermined ones are zero, and zero
             // means no motion.

@@ -4,7 +4,6 @@ use hicp_core::internal::small::{cholesky6, inverse_of};
 use hicp_core::{Correspondences, Matrix6, Vector6};
 
 use crate::metric::error_metric::ErrorMetric;
-use crate::system::freedom::reduce;
 use crate::system::normal_equations::NormalEquations;
 use crate::system::solve::eigen;
 
@@ -66,8 +65,7 @@ impl NormalEquations {
         let spare = self.rows.checked_sub(n_free).filter(|spare| *spare > 0)?;
         #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
         let variance = self.loss() / spare as f64;
-        let basis = self.basis();
-        let (mut reduced, _) = reduce(&basis, &self.scaled_hessian(), &self.scaled_gradient());
+        let (mut reduced, _) = self.reduced(&self.scaled_hessian());
         self.fill_held(&mut reduced);
         let eigenvalues = eigen(reduced)?.eigenvalues;
         if eigenvalues.min() <= RANK_TOLERANCE * eigenvalues.max() {
@@ -75,7 +73,7 @@ impl NormalEquations {
         }
         // Inverted around the pivot, where it is well conditioned, and then moved to the camera
         // origin. The columns of frozen components are zero.
-        let carried = self.camera_from_scaled() * basis;
+        let carried = self.camera_from_scaled() * self.basis();
         let covariance =
             carried * inverse_of(&cholesky6(&reduced)?) * carried.transpose() * variance;
         finite(&covariance)

@@ -6,7 +6,7 @@ use hicp_core::{Pair, Point3, Vector3};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moments {
     /// The first point with weight, so that an object far from the origin loses no digits.
-    origin: Point3<f64>,
+    pub(crate) origin: Point3<f64>,
     /// Σ w (x, y, z, 1).
     sums: [f64; 4],
     /// Σ w (x², y², z², 1).
@@ -33,10 +33,6 @@ impl Moments {
             squares: [x, y, z, sums[3]],
             ..*self
         }
-    }
-
-    pub(crate) fn origin(&self) -> Point3<f64> {
-        self.origin
     }
 
     pub(crate) fn weight(&self) -> f64 {
@@ -66,13 +62,18 @@ impl Moments {
         }
         let mean = Vector3::new(x, y, z) / weight;
         let variance = squares / weight - mean.norm_squared();
-        // If all points are at one place, any length is valid: the rotation is undetermined and
-        // stays damped.
-        let length = if variance > 1e-12 {
-            variance.sqrt()
-        } else {
-            1.0
-        };
-        Some((self.origin + mean, length))
+        Some((self.origin + mean, length_of(variance)))
+    }
+}
+
+/// Returns the RMS radius of points with a variance.
+///
+/// If all points are at one place, any length is valid: the rotation is undetermined and stays
+/// damped.
+pub(crate) fn length_of(variance: f64) -> f64 {
+    if variance > 1e-12 {
+        variance.sqrt()
+    } else {
+        1.0
     }
 }

@@ -4,6 +4,7 @@ use hicp_core::{Matrix3, Matrix6, Point3, Vector3, Vector6, se3, so3::hat};
 
 use crate::system::degeneracy::Degeneracy;
 use crate::system::freedom::Freedom;
+use crate::system::moments::Moments;
 use crate::system::row_sums::RowSums;
 
 /// The sums JᵀWJ and JᵀWr of weighted residual rows over a twist ξ = [ρ; φ], centered and scaled.
@@ -21,7 +22,9 @@ pub struct NormalEquations {
     pub(crate) pivot: Point3<f64>,
     pub(crate) length: f64,
     inverse_length: f64,
-    weight: Option<f64>,
+    /// Σ w over the pairs, if [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all)
+    /// summed the system.
+    pub(crate) weight: Option<f64>,
     sums: RowSums,
     pub(crate) rows: usize,
     /// Trace of the rows alone, if a prior was added: its stiffness must not raise the damping.
@@ -70,19 +73,16 @@ impl NormalEquations {
         }
     }
 
-    /// Returns this system with another pivot and another length scale.
-    #[must_use]
-    pub(crate) fn moved_to(&self, pivot: Point3<f64>, length: f64, weight: f64) -> Self {
-        let mut moved = Self::new(pivot, length);
-        moved.merge(self, 1.0);
-        moved.weight = Some(weight);
-        moved
-    }
-
-    /// Returns Σ w over the pairs, if
-    /// [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all) summed the system.
-    pub(crate) fn weight(&self) -> Option<f64> {
-        self.weight
+    /// Returns this system around the centroid of the points, with their RMS radius as the length.
+    ///
+    /// Without weight, or with numbers that are not finite, returns `None`.
+    pub(crate) fn centered(&self, moments: &Moments) -> Option<Self> {
+        let (pivot, length) = moments.pivot_and_length()?;
+        let mut centered = Self::new(pivot, length);
+        centered.merge(self, 1.0);
+        centered.weight = Some(moments.weight());
+        // Sources were checked with the centroid. This check covers targets and normals.
+        centered.loss().is_finite().then_some(centered)
     }
 
     /// Adds a scalar residual r of weight w that changes by `direction` · (displacement of

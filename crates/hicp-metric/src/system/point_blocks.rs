@@ -14,9 +14,7 @@ use crate::system::row_sums::RowSums;
 /// [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all), in a sixth of the time. The
 /// three rows of a pair at p are [eₖ, p × eₖ], so JᵀJ only needs Σ w, Σ w p and Σ w p pᵀ.
 pub(crate) fn system_of_points(pairs: &[Pair]) -> Option<NormalEquations> {
-    let system = vectorized(SumPoints { pairs })?;
-    // Sources were checked with the centroid. This check covers targets.
-    system.loss().is_finite().then_some(system)
+    vectorized(SumPoints { pairs })
 }
 
 struct SumPoints<'a> {
@@ -29,7 +27,7 @@ impl VectorLoop for SumPoints<'_> {
     #[inline(always)]
     fn run(self) -> Option<NormalEquations> {
         let first = Moments::about_first(self.pairs)?;
-        let origin = first.origin();
+        let origin = first.origin;
         let zero = [0.0; LANES];
         // Sums of p relative to the origin, of d = p − c, and of p × d; of p pᵀ the diagonal and
         // xy, yz, zx.
@@ -89,8 +87,6 @@ impl VectorLoop for SumPoints<'_> {
             loss,
         ]);
         let moments = first.with_sums([px, py, pz, w], [xx, yy, zz]);
-        let (pivot, length) = moments.pivot_and_length()?;
-        let system = NormalEquations::from_sums(origin, sums, rows);
-        Some(system.moved_to(pivot, length, moments.weight()))
+        NormalEquations::from_sums(origin, sums, rows).centered(&moments)
     }
 }

@@ -37,9 +37,7 @@ pub(crate) fn system_of_rows(
     pairs: &[Pair],
     row: impl Fn(&Pair) -> Row,
 ) -> Option<NormalEquations> {
-    let system = vectorized(SumBlocks { pairs, row })?;
-    // Sources were checked with the centroid. This check covers targets and normals.
-    system.loss().is_finite().then_some(system)
+    vectorized(SumBlocks { pairs, row })
 }
 
 struct SumBlocks<'a, F> {
@@ -53,7 +51,7 @@ impl<F: Fn(&Pair) -> Row> VectorLoop for SumBlocks<'_, F> {
     #[inline(always)]
     fn run(self) -> Option<NormalEquations> {
         let first = Moments::about_first(self.pairs)?;
-        let origin = first.origin();
+        let origin = first.origin;
         let mut moments = BlockMoments::new(first);
         let mut sums = [[0.0; LANES]; TRIANGLE];
         let mut rows = 0;
@@ -92,10 +90,7 @@ impl<F: Fn(&Pair) -> Row> VectorLoop for SumBlocks<'_, F> {
         }
         let mut totals = sums.iter().map(|lanes| lanes.iter().sum());
         let sums = RowSums::from_triangle(std::array::from_fn(|_| totals.next().unwrap_or(0.0)));
-        let system = NormalEquations::from_sums(origin, sums, rows);
-        let moments = moments.total();
-        let (pivot, length) = moments.pivot_and_length()?;
-        Some(system.moved_to(pivot, length, moments.weight()))
+        NormalEquations::from_sums(origin, sums, rows).centered(&moments.total())
     }
 }
 

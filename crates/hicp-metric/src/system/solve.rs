@@ -5,7 +5,6 @@ use hicp_core::{Isometry3, Matrix3, Matrix6, Vector6, se3};
 use nalgebra::SymmetricEigen;
 
 use crate::system::degeneracy::Degeneracy;
-use crate::system::freedom::reduce;
 use crate::system::normal_equations::NormalEquations;
 
 /// Damping relative to the mean diagonal of the scaled system. Undetermined directions do not move.
@@ -174,9 +173,13 @@ impl NormalEquations {
         Some(determined < self.n_free())
     }
 
-    /// Returns a matrix and the gradient without the frozen unknowns.
-    fn reduced(&self, hessian: &Matrix6<f64>) -> (Matrix6<f64>, Vector6<f64>) {
-        reduce(&self.basis(), hessian, &self.scaled_gradient())
+    /// Returns BᵀHB and Bᵀg: the equations of y, with zero rows and columns for frozen unknowns.
+    pub(crate) fn reduced(&self, hessian: &Matrix6<f64>) -> (Matrix6<f64>, Vector6<f64>) {
+        let basis = self.basis();
+        (
+            basis.transpose() * hessian * basis,
+            basis.transpose() * self.scaled_gradient(),
+        )
     }
 
     /// Applies Marquardt's damping relative to each diagonal entry.
