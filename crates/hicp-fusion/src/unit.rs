@@ -40,7 +40,9 @@ impl UnitCovariance {
     /// [`FusionError::Parameter`] if the radius is not between 10⁻⁶ and 10⁶ m, or if a coordinate
     /// of the center exceeds 10⁶ m.
     pub fn about_object(center: Point3<f64>, radius: f64) -> Result<Self, FusionError> {
-        let farthest = center.coords.amax();
+        // NaN is the largest number in this order.
+        let coordinates = center.iter().map(|x| x.abs());
+        let farthest = coordinates.max_by(f64::total_cmp).unwrap_or_default();
         for (name, value, least, expected) in [
             ("object radius", radius, 1e-6, "1e-6 to 1e6 m"),
             (
@@ -50,7 +52,7 @@ impl UnitCovariance {
                 "0 to 1e6 m",
             ),
         ] {
-            if !(least..=1e6).contains(&value) || !center.coords.iter().all(|x| x.is_finite()) {
+            if !(least..=1e6).contains(&value) {
                 return Err(FusionError::Parameter {
                     name,
                     value,

@@ -259,7 +259,16 @@ fn the_unit_around_an_object_does_not_depend_on_the_camera() {
     for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(UnitCovariance::about_object(Point3::origin(), radius).is_err());
     }
-    assert!(UnitCovariance::about_object(Point3::new(f64::NAN, 0.0, 0.0), 0.1).is_err());
+    for x in [f64::NAN, f64::NEG_INFINITY, -2e6] {
+        let error = UnitCovariance::about_object(Point3::new(0.0, x, 3.0), 0.1).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            format!(
+                "largest coordinate of the object's center is {}, expected 0 to 1e6 m",
+                x.abs()
+            )
+        );
+    }
 }
 
 #[test]
