@@ -4,20 +4,6 @@ use glam::DVec3;
 
 use crate::fixed::GUARD_PIXELS;
 
-/// The half-space of homogeneous pixels (u·z, v·z, z) with `normal · h >= offset`.
-#[derive(Clone, Copy, Debug)]
-struct HalfSpace {
-    normal: DVec3,
-    offset: f64,
-}
-
-impl HalfSpace {
-    /// Returns the signed distance without a particular unit, not negative inside.
-    fn distance(&self, h: DVec3) -> f64 {
-        self.normal.dot(h) - self.offset
-    }
-}
-
 /// Clips triangles and reuses its buffers between calls.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Clipper {
@@ -36,11 +22,7 @@ impl Clipper {
         self.polygon.clear();
         self.polygon.extend(triangle);
         // The near plane comes first: the others are meaningful only for positive z.
-        let near_plane = HalfSpace {
-            normal: DVec3::Z,
-            offset: near,
-        };
-        self.cut(&near_plane);
+        self.cut(DVec3::Z, near);
         for h in &mut self.polygon {
             // Interpolation may miss the plane by a rounding error.
             h.z = h.z.max(near);
@@ -51,23 +33,22 @@ impl Clipper {
             DVec3::new(0.0, 1.0, GUARD_PIXELS),
             DVec3::new(0.0, -1.0, GUARD_PIXELS),
         ] {
-            self.cut(&HalfSpace {
-                normal,
-                offset: 0.0,
-            });
+            self.cut(normal, 0.0);
         }
         &self.polygon
     }
 
-    /// Clips at one plane, a step of the Sutherland–Hodgman algorithm.
-    fn cut(&mut self, inside: &HalfSpace) {
+    /// Keeps the half-space `normal · h >= offset`, a step of the Sutherland–Hodgman algorithm.
+    fn cut(&mut self, normal: DVec3, offset: f64) {
         let Some(&last) = self.polygon.last() else {
             return;
         };
+        // The signed distance without a particular unit, not negative inside.
+        let distance = |h: DVec3| normal.dot(h) - offset;
         self.next.clear();
-        let (mut from, mut from_distance) = (last, inside.distance(last));
+        let (mut from, mut from_distance) = (last, distance(last));
         for &to in &self.polygon {
-            let to_distance = inside.distance(to);
+            let to_distance = distance(to);
             if (from_distance >= 0.0) != (to_distance >= 0.0) {
                 // Always from the inside to the outside. Both triangles at an edge then round
                 // alike, although they traverse it in opposite directions.

@@ -108,7 +108,7 @@ impl Rasterizer {
                 bounds.include(u, v);
                 ProjectedVertex::new(u, v, inverse_depth)
             } else {
-                bounds.include_cut();
+                bounds.cut = true;
                 ProjectedVertex::TO_CLIP
             }
         }));
@@ -120,7 +120,7 @@ impl Rasterizer {
             Culling::Never => Keep::Both,
             Culling::BackFaces => Keep::Negative,
             // The near plane opens a closed mesh, so its inside may be visible.
-            Culling::Auto if bounds.is_cut() => Keep::Both,
+            Culling::Auto if bounds.cut => Keep::Both,
             Culling::Auto => match mesh.facing() {
                 Facing::Outward => Keep::Negative,
                 Facing::Inward => Keep::Positive,

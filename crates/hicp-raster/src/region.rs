@@ -14,7 +14,8 @@ pub(crate) struct Bounds {
     u_max: f64,
     v_min: f64,
     v_max: f64,
-    cut: bool,
+    /// `true` if a vertex lies in front of the near plane.
+    pub(crate) cut: bool,
 }
 
 impl Bounds {
@@ -35,17 +36,6 @@ impl Bounds {
         self.u_max = if u > self.u_max { u } else { self.u_max };
         self.v_min = if v < self.v_min { v } else { self.v_min };
         self.v_max = if v > self.v_max { v } else { self.v_max };
-    }
-
-    /// Extends the bounds by a vertex in front of the near plane.
-    #[inline]
-    pub(crate) fn include_cut(&mut self) {
-        self.cut = true;
-    }
-
-    /// Returns whether a vertex lies in front of the near plane.
-    pub(crate) fn is_cut(&self) -> bool {
-        self.cut
     }
 
     /// Returns the part of `region` that triangles over these vertices can cover.
@@ -132,7 +122,7 @@ pub fn projected_region(
             let inverse_depth = 1.0 / h.z;
             bounds.include(h.x * inverse_depth, h.y * inverse_depth);
         } else {
-            bounds.include_cut();
+            bounds.cut = true;
         }
     }
     bounds.region_within(&region.intersection(&camera.region()))
