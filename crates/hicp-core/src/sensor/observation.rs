@@ -356,7 +356,9 @@ impl Observation {
             ..region
         };
         grid.grid(stride as usize)
-            .filter_map(move |(u, v)| region.index(u, v))
+            .map(move |(u, v)| {
+                (v - region.v_min) as usize * region.width() + (u - region.u_min) as usize
+            })
             .map(|index| (internal::index(index), &surfels[index]))
             .filter(|(_, s)| s.point.z > 0.0)
     }
