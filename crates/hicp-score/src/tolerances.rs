@@ -31,7 +31,7 @@ impl AgreementCounts {
 
     /// Adds a pixel of the intersection whose distances differ by `difference` ≥ 0.
     #[inline]
-    pub(crate) fn add(&mut self, difference: f64, weight: u64) {
+    pub(crate) fn add(&mut self, difference: f64) {
         let relative = difference * self.inverse_diameter;
         // A first guess, which rounding may put off by one. Then the strict comparison that defines
         // "correct".
@@ -45,7 +45,7 @@ impl AgreementCounts {
         while k < N_TOLERANCES && !correct(k) {
             k += 1;
         }
-        self.histogram[k] += weight;
+        self.histogram[k] += 1;
     }
 
     /// Returns e(τ) for every tolerance.

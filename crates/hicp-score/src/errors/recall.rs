@@ -73,17 +73,11 @@ impl TargetErrors {
         threshold: f64,
         error: impl Fn(&PoseErrors) -> f64,
     ) -> Vec<Option<usize>> {
-        let mut taken = vec![None; self.instances];
-        assign(
-            &mut taken,
-            self.estimates.len(),
-            threshold,
-            |estimate, instance| {
-                let errors = self.estimates[estimate].get(instance);
-                errors.map_or(f64::INFINITY, &error)
-            },
-        );
-        taken
+        let counts = (self.estimates.len(), self.instances);
+        assign(counts, threshold, |estimate, instance| {
+            let errors = self.estimates[estimate].get(instance);
+            errors.map_or(f64::INFINITY, &error)
+        })
     }
 
     /// Returns the ADI, in meters, of the estimate that remains for each instance.
@@ -125,20 +119,22 @@ pub fn match_instances(
     instances: usize,
     threshold: f64,
 ) -> Vec<Option<usize>> {
-    let mut taken = vec![None; instances];
-    assign(&mut taken, errors.len(), threshold, |estimate, instance| {
-        let error = errors[estimate].get(instance);
-        error.copied().unwrap_or(f64::INFINITY)
-    });
-    taken
+    assign(
+        (errors.len(), instances),
+        threshold,
+        |estimate, instance| {
+            let error = errors[estimate].get(instance);
+            error.copied().unwrap_or(f64::INFINITY)
+        },
+    )
 }
 
 fn assign(
-    taken: &mut [Option<usize>],
-    estimates: usize,
+    (estimates, instances): (usize, usize),
     threshold: f64,
     error: impl Fn(usize, usize) -> f64,
-) {
+) -> Vec<Option<usize>> {
+    let mut taken = vec![None; instances];
     for estimate in 0..estimates {
         let mut best = (threshold, None);
         for (instance, by) in taken.iter().enumerate() {
@@ -151,6 +147,7 @@ fn assign(
             taken[instance] = Some(estimate);
         }
     }
+    taken
 }
 
 /// Returns the indices of the `count` estimates with the highest scores, highest first.
@@ -158,7 +155,10 @@ fn assign(
 /// Of equal scores, the first precedes.
 #[must_use]
 pub fn top_estimates(scores: &[f64], count: usize) -> Vec<usize> {
-    descending(scores, count)
+    let mut order: Vec<usize> = (0..scores.len()).collect();
+    order.sort_by(|a, b| scores[*b].total_cmp(&scores[*a]));
+    order.truncate(count);
+    order
 }
 
 /// Returns the indices of the `count` instances with the largest visible fractions, largest first.
@@ -167,14 +167,7 @@ pub fn top_estimates(scores: &[f64], count: usize) -> Vec<usize> {
 /// in an image, the most visible ones.
 #[must_use]
 pub fn most_visible(fractions: &[f64], count: usize) -> Vec<usize> {
-    descending(fractions, count)
-}
-
-fn descending(values: &[f64], count: usize) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|a, b| values[*b].total_cmp(&values[*a]));
-    order.truncate(count);
-    order
+    top_estimates(fractions, count)
 }
 
 /// Recalls over any number of targets: of an object, of a scene, of a dataset.

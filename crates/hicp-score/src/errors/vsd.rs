@@ -80,7 +80,7 @@ pub fn vsd(
             union += 1;
         }
         if *in_estimate && *in_truth {
-            counts.add((d_estimate - d_truth).abs(), 1);
+            counts.add((d_estimate - d_truth).abs());
         }
     }
     Ok(counts.errors(union))
@@ -175,7 +175,7 @@ impl Vsd {
         let Some(estimate) = context.view(camera_from_object) else {
             return [1.0; N_TOLERANCES];
         };
-        let mut union = truth.depth().iter().filter(|z| **z > 0.0).count() as u64;
+        let mut union = truth.n_rendered() as u64;
         let mut counts = AgreementCounts::new(model.diameter());
         let region = estimate.region();
         let rows = estimate.depth().chunks_exact(region.width().max(1));
@@ -187,10 +187,8 @@ impl Vsd {
                 let z_true = truth.depth_at(u, v);
                 if z_true > 0.0 {
                     let difference = (f64::from(z) - f64::from(z_true)).abs();
-                    counts.add(
-                        difference * camera.distance_per_depth(f64::from(u), f64::from(v)),
-                        1,
-                    );
+                    let ratio = camera.distance_per_depth(f64::from(u), f64::from(v));
+                    counts.add(difference * ratio);
                 } else {
                     union += 1;
                 }
