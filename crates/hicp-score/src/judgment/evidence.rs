@@ -121,16 +121,16 @@ impl Evidence {
     }
 
     pub(crate) fn of(grid: &Grid) -> Self {
-        let area = (grid.step() * grid.step()) as f64;
+        let area = (grid.step * grid.step) as f64;
         // Of the pixels outside and inside the mask.
         let mut counts = [[0_usize; Cell::KINDS]; 2];
         let mut residuals = Median::new();
-        let scale = Scale::new(grid.diameter());
-        for index in grid.rendered() {
-            let cell = grid.cell(index);
-            counts[usize::from(grid.masked(index))][cell as usize] += 1;
+        let scale = Scale::new(grid.diameter);
+        for index in grid.rendered.iter() {
+            let cell = grid.cells[index];
+            counts[usize::from(grid.masked[index])][cell as usize] += 1;
             if matches!(cell, Cell::Agrees | Cell::SeenThrough) {
-                residuals.add(scale.bin(grid.gap(index)));
+                residuals.add(scale.bin(grid.gap[index]));
             }
         }
         let contour = Contour::of(grid);
@@ -140,7 +140,7 @@ impl Evidence {
         let [missing, explained] = counts.map(|count| count[Cell::Agrees as usize]);
         let masked = counts[1].iter().sum::<usize>() - counts[1][Cell::Unmeasured as usize];
         let share = |n: usize, of: usize| n as f64 / of.max(1) as f64;
-        let all = grid.n_measured();
+        let all = grid.n_measured;
         let of_mask = |n: usize| {
             if all > 0.0 {
                 (1.0 - n as f64 * area / all).clamp(0.0, 1.0)
@@ -150,9 +150,9 @@ impl Evidence {
         };
         let extra = all - masked as f64 * area;
         // A line at a random angle crosses 4/π pixel borders per pixel of its length.
-        let length = (contour.sides * grid.step()) as f64 * std::f64::consts::FRAC_PI_4;
+        let length = (contour.sides * grid.step) as f64 * std::f64::consts::FRAC_PI_4;
         Self {
-            pixels: rendered * grid.step().pow(2),
+            pixels: rendered * grid.step.pow(2),
             agrees: share(agreeing, rendered),
             seen_through: share(count(Cell::SeenThrough), rendered),
             inside: share(count(Cell::Inside), rendered),
@@ -160,7 +160,7 @@ impl Evidence {
             unmeasured: share(count(Cell::Unmeasured), rendered),
             unexplained: of_mask(explained),
             residual: residuals.get(),
-            noise: grid.noise(),
+            noise: grid.noise.get(),
             contour: (contour.compared > 0).then(|| share(contour.ends, contour.compared)),
             mask_extra: of_mask(masked),
             mask_missing: share(missing, agreeing),
@@ -186,13 +186,13 @@ struct Contour {
 impl Contour {
     fn of(grid: &Grid) -> Self {
         let mut contour = Self::default();
-        for index in grid.rim() {
-            let agrees = grid.cell(index) == Cell::Agrees;
-            let rendered = grid.gap(index) + grid.measured(index);
+        for index in grid.rim.iter() {
+            let agrees = grid.cells[index] == Cell::Agrees;
+            let rendered = grid.gap[index] + grid.measured[index];
             for other in Grid::neighbors(index) {
-                if !grid.cell(other).is_rendered() {
+                if !grid.cells[other].is_rendered() {
                     contour.sides += 1;
-                    let measured = grid.measured(other);
+                    let measured = grid.measured[other];
                     if agrees && measured > 0.0 {
                         contour.compared += 1;
                         let ends = (measured - rendered).abs() > grid.tolerance();

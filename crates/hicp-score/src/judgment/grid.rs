@@ -39,29 +39,33 @@ impl Cell {
 
 /// The compared pixels.
 pub(crate) struct Grid {
-    cells: [Cell; CELLS],
-    /// Measured depth, meters.
-    measured: [f32; CELLS],
+    /// The relation of the surfaces at each cell.
+    pub(crate) cells: [Cell; CELLS],
+    /// Measured depth, meters; 0 if it is missing.
+    pub(crate) measured: [f32; CELLS],
     /// Rendered minus measured depth, meters; NaN if one is missing.
-    gap: [f32; CELLS],
-    masked: [bool; CELLS],
-    rendered: Indices,
-    /// The rendered cells at the silhouette.
-    rim: Indices,
-    /// Distances of measured pixels from the mean of their neighbors in the row: of agreeing
-    /// pixels, and of the rendered pixels of the mask.
-    noise: Median,
-    noise_in_mask: Median,
-    /// Whether a cell is behind a measured surface.
-    has_hidden: bool,
+    pub(crate) gap: [f32; CELLS],
+    pub(crate) masked: [bool; CELLS],
+    pub(crate) rendered: Indices,
+    /// The rendered cells with a neighbor that is not rendered.
+    pub(crate) rim: Indices,
+    /// Distances of measured pixels from the mean of their neighbors in the row, in diameters: of
+    /// agreeing pixels, and of the rendered pixels of the mask.
+    pub(crate) noise: Median,
+    pub(crate) noise_in_mask: Median,
+    /// `true` if a cell is behind a measured surface.
+    pub(crate) has_hidden: bool,
     /// Number of measured pixels of the mask.
-    n_measured: usize,
-    width: usize,
-    height: usize,
-    step: usize,
-    diameter: f32,
+    pub(crate) n_measured: f64,
+    /// Numbers of columns and rows.
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// The distance between cells, pixels.
+    pub(crate) step: usize,
+    /// The diameter of the model, meters.
+    pub(crate) diameter: f32,
     /// Width of a cell per meter of distance.
-    spread: f32,
+    pub(crate) spread: f32,
 }
 
 impl Grid {
@@ -83,7 +87,7 @@ impl Grid {
             noise: Median::new(),
             noise_in_mask: Median::new(),
             has_hidden: false,
-            n_measured: 0,
+            n_measured: 0.0,
             width: 0,
             height: 0,
             step: 1,
@@ -101,7 +105,7 @@ impl Grid {
         let step = region.width().max(region.height()).div_ceil(SIDE).max(1);
         let image_width = camera.width() as usize;
         let (depth, mask) = (observation.depth().pixels(), observation.mask().pixels());
-        self.n_measured = observation.n_measured();
+        self.n_measured = observation.n_measured() as f64;
         self.width = region.width().div_ceil(step);
         self.height = region.height().div_ceil(step);
         self.step = step;
@@ -165,90 +169,24 @@ impl Grid {
         }
     }
 
-    /// Returns whether a cell is behind a measured surface.
-    pub(crate) fn has_hidden(&self) -> bool {
-        self.has_hidden
-    }
-
-    /// Returns the number of measured pixels of the mask.
-    pub(crate) fn n_measured(&self) -> f64 {
-        self.n_measured as f64
+    /// Iterates over the rendered cells of a kind, row by row.
+    pub(crate) fn of_kind(&self, kind: Cell) -> impl Iterator<Item = usize> {
+        let rendered = self.rendered.iter();
+        rendered.filter(move |index| self.cells[*index] == kind)
     }
 
     /// Returns the mean depth of the agreeing cells, meters; 0 if there are none.
     pub(crate) fn distance(&self) -> f64 {
-        let agreeing = self.rendered.iter();
-        let agreeing = agreeing.filter(|index| self.cells[*index] == Cell::Agrees);
+        let agreeing = self.of_kind(Cell::Agrees);
         let (sum, count) = agreeing.fold((0.0, 0.0), |(sum, count), index| {
             (sum + f64::from(self.measured[index]), count + 1.0)
         });
         sum / f64::max(count, 1.0)
     }
 
-    /// Returns the distance between cells, pixels.
-    pub(crate) fn step(&self) -> usize {
-        self.step
-    }
-
-    /// Returns the diameter of the model, meters.
-    pub(crate) fn diameter(&self) -> f32 {
-        self.diameter
-    }
-
     /// Returns the distance within which surfaces agree, meters.
     pub(crate) fn tolerance(&self) -> f32 {
         AGREES * self.diameter
-    }
-
-    /// Returns the width of a cell per meter of distance.
-    pub(crate) fn spread(&self) -> f32 {
-        self.spread
-    }
-
-    /// Iterates over the cells at which the model is rendered, row by row.
-    pub(crate) fn rendered(&self) -> impl Iterator<Item = usize> + '_ {
-        self.rendered.iter()
-    }
-
-    /// Iterates over the rendered cells with a neighbor that is not rendered, row by row.
-    pub(crate) fn rim(&self) -> impl Iterator<Item = usize> + '_ {
-        self.rim.iter()
-    }
-
-    /// Returns the relation of the surfaces at a cell.
-    pub(crate) fn cell(&self, index: usize) -> Cell {
-        self.cells[index]
-    }
-
-    /// Replaces the relation at a rendered cell.
-    pub(crate) fn set_cell(&mut self, index: usize, cell: Cell) {
-        self.cells[index] = cell;
-    }
-
-    /// Returns whether the pixel of a cell is masked.
-    pub(crate) fn masked(&self, index: usize) -> bool {
-        self.masked[index]
-    }
-
-    /// Returns the measured depth at a cell, meters; 0 if it is missing.
-    pub(crate) fn measured(&self, index: usize) -> f32 {
-        self.measured[index]
-    }
-
-    /// Returns the rendered minus the measured depth, meters; NaN if one is missing.
-    pub(crate) fn gap(&self, index: usize) -> f32 {
-        self.gap[index]
-    }
-
-    /// Returns the median distance of an agreeing pixel from the mean of its neighbors in the row,
-    /// in diameters.
-    pub(crate) fn noise(&self) -> f64 {
-        self.noise.get()
-    }
-
-    /// Returns that of a rendered pixel of the mask.
-    pub(crate) fn noise_in_mask(&self) -> f64 {
-        self.noise_in_mask.get()
     }
 
     /// Returns the cell that is some steps away, at most 3 beyond the grid.
@@ -265,33 +203,28 @@ impl Grid {
     pub(crate) fn place(index: usize) -> (usize, usize) {
         (index / STRIDE - MARGIN, index % STRIDE - MARGIN)
     }
-
-    /// Returns the numbers of rows and columns.
-    pub(crate) fn size(&self) -> (usize, usize) {
-        (self.height, self.width)
-    }
 }
 
 /// The indices of some cells, row by row.
-struct Indices {
+pub(crate) struct Indices {
     cells: [u16; SIDE * SIDE],
     count: usize,
 }
 
 impl Indices {
-    const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         cells: [0; SIDE * SIDE],
         count: 0,
     };
 
-    fn push(&mut self, index: usize) {
+    pub(crate) fn push(&mut self, index: usize) {
         #[allow(clippy::cast_possible_truncation)] // Fewer than 2¹⁶ cells.
         let cell = index as u16;
         self.cells[self.count] = cell;
         self.count += 1;
     }
 
-    fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         let cells = &self.cells[..self.count];
         cells.iter().map(|cell| usize::from(*cell))
     }

@@ -64,24 +64,22 @@ impl Misfit {
     }
 
     pub(crate) fn of(grid: &Grid) -> Self {
-        let sigma = grid.noise_in_mask() / ROUGHNESS_PER_SIGMA;
-        let diameter = f64::from(grid.diameter());
+        let sigma = grid.noise_in_mask.get() / ROUGHNESS_PER_SIGMA;
+        let diameter = f64::from(grid.diameter);
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
         let limit = |(share, sigmas): (f64, f64)| ((share + sigmas * sigma) * diameter) as f32;
         let [fine, rim, near, coarse] = [FINE, RIM, NEAR, COARSE].map(limit);
         // The gap of a pixel that is not compared is NaN, which is below no limit.
-        let fits = |index: usize| grid.masked(index) & (grid.gap(index).abs() < near);
+        let fits = |index: usize| grid.masked[index] & (grid.gap[index].abs() < near);
 
         let mut ahead = Share::default();
         let mut explained = 0_usize;
         let (mut sum, mut count) = (0.0, 0_usize);
         let (mut products, mut pairs) = (0.0, 0_usize);
-        let (height, width) = grid.size();
         let mut parts = [[(0_u32, 0_u32); PARTS]; PARTS];
-        let of_row = part_of(height);
-        let of_column = part_of(width);
-        for index in grid.rendered() {
-            let (gap, masked) = (grid.gap(index), grid.masked(index));
+        let (of_row, of_column) = (part_of(grid.height), part_of(grid.width));
+        for index in grid.rendered.iter() {
+            let (gap, masked) = (grid.gap[index], grid.masked[index]);
             if gap.is_nan() {
                 continue;
             }
@@ -102,7 +100,7 @@ impl Misfit {
                 for side in [Grid::SIDES[0], Grid::SIDES[2]] {
                     let other = Grid::offset(index, LAG * side);
                     if fits(other) {
-                        products += gap * f64::from(grid.gap(other));
+                        products += gap * f64::from(grid.gap[other]);
                         pairs += 1;
                     }
                 }
@@ -115,8 +113,8 @@ impl Misfit {
             .filter(|(all, _)| *all >= LEAST_CELLS);
         let mut weak = Share::default();
         compared.for_each(|(all, agree)| weak.add(2 * agree < *all));
-        let area = (grid.step() * grid.step()) as f64;
-        let all = grid.n_measured().max(1.0);
+        let area = (grid.step * grid.step) as f64;
+        let all = grid.n_measured.max(1.0);
         Self {
             sigma,
             systematic: (products / pairs.max(1) as f64).max(0.0).sqrt() / diameter,
@@ -160,22 +158,22 @@ impl Rim {
     /// Compares the pixels around the silhouette with a tolerance in meters.
     fn of(grid: &Grid, tolerance: f32) -> Self {
         let mut rim = Self::default();
-        for index in grid.rim().filter(|index| !grid.gap(*index).is_nan()) {
-            let rendered = grid.measured(index) + grid.gap(index);
+        for index in grid.rim.iter().filter(|index| !grid.gap[*index].is_nan()) {
+            let rendered = grid.measured[index] + grid.gap[index];
             for side in Grid::SIDES {
-                if grid.cell(Grid::offset(index, side)) != Cell::Empty {
+                if grid.cells[Grid::offset(index, side)] != Cell::Empty {
                     continue;
                 }
                 for inner in [0, -1].map(|steps| Grid::offset(index, steps * side)) {
-                    let gap = grid.gap(inner);
-                    if grid.cell(inner).is_rendered() && gap <= tolerance {
+                    let gap = grid.gap[inner];
+                    if grid.cells[inner].is_rendered() && gap <= tolerance {
                         rim.ahead.add(gap < -tolerance);
                     }
                 }
                 for outer in [2, 3].map(|steps| Grid::offset(index, steps * side)) {
-                    let measured = grid.measured(outer);
+                    let measured = grid.measured[outer];
                     let step = measured - rendered;
-                    if grid.cell(outer) == Cell::Empty && measured > 0.0 && step >= -tolerance {
+                    if grid.cells[outer] == Cell::Empty && measured > 0.0 && step >= -tolerance {
                         rim.open.add(step <= tolerance);
                     }
                 }
