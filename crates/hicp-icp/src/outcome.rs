@@ -42,8 +42,7 @@ pub enum Termination {
 }
 
 impl Termination {
-    /// All reasons that the library defines, so all but those with
-    /// a name inside.
+    /// All reasons that the library defines, except for those with a name inside.
     pub const ALL: [Self; 11] = [
         Self::Converged,
         Self::IterationLimit,

@@ -1,6 +1,6 @@
 //! Descent on a score.
 
-use hicp_core::{Isometry3, Problem, Translation3, UnitQuaternion, Vector3};
+use hicp_core::{Isometry3, Point3, Problem, Translation3, UnitQuaternion, Vector3};
 use hicp_score::Score;
 
 use crate::outcome::{Outcome, Termination};
@@ -83,13 +83,8 @@ impl<C: Score> Stage for Descent<C> {
                     }
                     spent += 1;
                     let length = step * diameter * *sign;
-                    let pose = moved(
-                        &best.1,
-                        &(best.1 * model.center()).coords,
-                        axis,
-                        length,
-                        diameter,
-                    );
+                    let center = best.1 * model.center();
+                    let pose = moved(&best.1, center, axis, length, diameter);
                     let score = self.score.score(&mut context, &pose);
                     if score < best.0 - self.min_gain {
                         best = (score, pose);
@@ -119,7 +114,7 @@ impl<C: Score> Stage for Descent<C> {
 /// through `center` such that points at half the diameter move by that length.
 fn moved(
     pose: &Isometry3<f64>,
-    center: &Vector3<f64>,
+    center: Point3<f64>,
     axis: usize,
     length: f64,
     diameter: f64,
@@ -130,5 +125,5 @@ fn moved(
         return Translation3::from(direction * length) * pose;
     }
     let turn = UnitQuaternion::from_scaled_axis(direction * (2.0 * length / diameter));
-    Translation3::from(*center) * turn * Translation3::from(-center) * pose
+    Isometry3::rotation_wrt_point(turn, center) * pose
 }

@@ -26,10 +26,7 @@ impl<S: Stage> Stage for AtResolution<S> {
         init: &Isometry3<f64>,
         session: &mut Session<'_>,
     ) -> Outcome {
-        if self.factor <= 1 {
-            return self.stage.run(problem, init, session);
-        }
-        let Some((model, observation)) = problem.sides() else {
+        let Some((model, observation)) = problem.sides().filter(|_| self.factor > 1) else {
             return self.stage.run(problem, init, session);
         };
         let coarse = observation.decimated(self.factor);

@@ -85,14 +85,12 @@ impl CoarseGrid {
             seen_through_meters: None,
         };
         for ((u, v), (index, z)) in camera.region().pixels().zip(depth.iter().enumerate()) {
-            let x = (f64::from(u) - camera.cx()) / camera.fx();
-            let y = (f64::from(v) - camera.cy()) / camera.fy();
             let place = (u * factor, v * factor);
             grid.measured
                 .push(median_around(fine, place, factor).unwrap_or(*z));
             grid.weight.push(weight(index, place));
             #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
-            let distance = (x * x + y * y + 1.0).sqrt() as f32;
+            let distance = camera.distance_per_depth(u.into(), v.into()) as f32;
             grid.distance_per_depth.push(distance);
         }
         grid.measured.resize(length, 0.0);

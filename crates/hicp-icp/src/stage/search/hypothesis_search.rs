@@ -1,6 +1,6 @@
 //! The stage that searches.
 
-use hicp_core::{Isometry3, Observation, Problem, se3};
+use hicp_core::{Isometry3, Problem, se3};
 use hicp_score::Score;
 
 use crate::outcome::{Outcome, Termination, Verdict};
@@ -403,8 +403,8 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
         self.found.clear();
         self.explored.clear();
         session.workspace.alternatives.clear();
-        let seen = |(_, observation): (_, &Observation)| observation.has_surface();
-        let Some((model, _)) = problem.sides().filter(|sides| seen(*sides)) else {
+        let seen = problem.sides().filter(|(_, o)| o.has_surface());
+        let Some((model, _)) = seen else {
             return local;
         };
         if !se3::is_finite(init) {

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use hicp_core::internal::small::eigen3;
 use hicp_core::internal::{VectorLoop, centroid, vectorized};
 use hicp_core::{
-    Isometry3, Matrix3, Model, Observation, Surfel, TriMesh, UnitQuaternion, UnitVector3, Vector3,
+    Isometry3, Matrix3, Model, Observation, RigidTransform, Surfel, Translation3, TriMesh,
+    UnitQuaternion, UnitVector3, Vector3,
 };
 
 use crate::stage::search::distinct::Distinct;
@@ -237,12 +238,14 @@ fn align(
     tolerance: f32,
 ) -> Option<Isometry3<f64>> {
     let center = centroid(samples)?;
-    let shift = center - rotation * center;
-    let mut moved = Moved::new(&Isometry3::from_parts(shift.into(), *rotation));
+    let mut shift = (center - rotation * center).cast::<f32>();
+    let turn = RigidTransform::new(&Isometry3::from_parts(Translation3::identity(), *rotation));
     for alignment in 0..ALIGNMENTS {
         let (mut sum, mut near) = (Vector3::<f32>::zeros(), 0_usize);
         for sample in samples.iter().step_by(STRIDE) {
-            if let Some(residual) = moved.residual(sample, (samples, columns), tolerance) {
+            let mut moved = turn.surfel(sample);
+            moved.point += shift;
+            if let Some(residual) = residual(&moved, (samples, columns), tolerance) {
                 sum += residual;
                 near += 1;
             }
@@ -253,45 +256,26 @@ fn align(
             return None;
         }
         // A shift moves surfaces along their normals by a third of it on average.
-        moved.shift += sum * (2.0 / near as f32);
+        shift += sum * (2.0 / near as f32);
     }
-    Some(Isometry3::from_parts(
-        moved.shift.cast::<f64>().into(),
-        *rotation,
-    ))
+    let shift = shift.cast::<f64>();
+    Some(Isometry3::from_parts(shift.into(), *rotation))
 }
 
-/// A motion of samples.
-struct Moved {
-    turn: Matrix3<f32>,
-    shift: Vector3<f32>,
-}
-
-impl Moved {
-    fn new(motion: &Isometry3<f64>) -> Self {
-        Self {
-            turn: motion.rotation.to_rotation_matrix().into_inner().cast(),
-            shift: motion.translation.vector.cast(),
-        }
-    }
-
-    /// Returns the step from a moved sample to the surface, along the normal.
-    ///
-    /// Returns `None` if no surface of similar normal is near.
-    fn residual(
-        &self,
-        sample: &Surfel,
-        (samples, columns): (&[Surfel], &Columns),
-        tolerance: f32,
-    ) -> Option<Vector3<f32>> {
-        let point = self.turn * sample.point.coords + self.shift;
-        let normal = self.turn * *sample.normal;
-        let limit = 9.0 * tolerance * tolerance;
-        let nearest = &samples[columns.nearest(&point, Some(&normal), limit)?];
-        // Samples do not lie on samples, so only the distance along the normal counts.
-        let along = nearest.normal.dot(&(nearest.point.coords - point));
-        (along.abs() < tolerance).then(|| *nearest.normal * along)
-    }
+/// Returns the step from a moved sample to the surface, along the normal.
+///
+/// Returns `None` if no surface of similar normal is near.
+fn residual(
+    moved: &Surfel,
+    (samples, columns): (&[Surfel], &Columns),
+    tolerance: f32,
+) -> Option<Vector3<f32>> {
+    let limit = 9.0 * tolerance * tolerance;
+    let nearest = columns.nearest(&moved.point.coords, Some(&moved.normal), limit)?;
+    let nearest = &samples[nearest];
+    // Samples do not lie on samples, so only the distance along the normal counts.
+    let along = nearest.normal.dot(&(nearest.point - moved.point));
+    (along.abs() < tolerance).then(|| *nearest.normal * along)
 }
 
 /// The coordinates of the samples and of their normals, for whole vectors. Those that are missing
