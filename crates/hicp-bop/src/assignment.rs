@@ -37,10 +37,8 @@ pub fn assign_masks(overlaps: &[Vec<u64>]) -> Vec<Option<usize>> {
         return own;
     }
     let gain = |mask: usize, row: usize| {
-        let (overlap, most) = match (overlaps[row].get(mask), own[row]) {
-            (Some(overlap), Some(most)) => (*overlap, overlaps[row][most]),
-            _ => return 0,
-        };
+        let overlap = overlaps[row].get(mask).copied().unwrap_or_default();
+        let most = own[row].map_or(0, |own| overlaps[row][own]);
         if overlap >= most.div_ceil(2) {
             overlap
         } else {
@@ -54,15 +52,11 @@ pub fn assign_masks(overlaps: &[Vec<u64>]) -> Vec<Option<usize>> {
     chosen
 }
 
+/// Returns the index of the largest value above 0, the first among equals.
 fn first_largest(values: &[u64]) -> Option<usize> {
-    let mut best = None;
-    let mut most = 0;
-    for (index, value) in values.iter().enumerate() {
-        if *value > most {
-            (best, most) = (Some(index), *value);
-        }
-    }
-    best
+    // Of equal values, `max_by_key` returns the last.
+    let positive = (0..values.len()).rev().filter(|index| values[*index] > 0);
+    positive.max_by_key(|index| values[*index])
 }
 
 /// Returns a matching with the largest total gain between `n` items on the left and `m` on the

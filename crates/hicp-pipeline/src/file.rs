@@ -60,7 +60,8 @@ impl PipelineFile {
             origin: origin.to_owned(),
             overrides: Vec::new(),
         };
-        file.root().map(|_| file.clone())
+        file.root()?;
+        Ok(file)
     }
 
     /// Overrides a field: `path=value`, where the path is dotted with list indices from 0, and the

@@ -28,7 +28,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(PlaneToPoint)
     });
     catalog.add_metric("symmetric", |p| {
-        p.about = "((T o − c)ᵀ(n + m))², the planes of both sides, half the rotation each. \
+        p.about = "((T o − c)ᵀ(n + m)/2)², the planes of both sides, half the rotation each. \
             Source: Rusinkiewicz 2019. Cost: O(n).";
         Ok(Symmetric)
     });
