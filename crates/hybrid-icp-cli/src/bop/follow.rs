@@ -112,7 +112,8 @@ impl FollowOptions {
     /// Warns that all poses are guesses; `failed` says what happened in none of the images.
     pub(super) fn distrust(&self, images: usize, failed: &str) {
         warn(format_args!(
-            "{}: {failed} in none of its {images} images: do not trust its poses, and check {}, and {}",
+            "{}: {failed} in none of its {images} images: do not trust its poses, and check {}, {}, \
+             and cam_K and depth_scale in scene_camera.json",
             self.output.display(),
             self.init.display(),
             self.check_unit()

@@ -8,6 +8,9 @@ use serde_json::{Value, json};
 
 use crate::pose_json::add_pose;
 
+/// The description of an image in which the model overlaps no mask of the object.
+pub(super) const NO_OVERLAP: &str = "moved with the camera: no overlap with a mask of the object";
+
 /// An image of the sequence.
 #[derive(Clone, Debug)]
 pub(super) struct Line {
@@ -71,6 +74,11 @@ impl Line {
             reason,
             off: None,
         }
+    }
+
+    /// Returns `true` if the object was elsewhere than the motion of the camera says.
+    pub(super) fn contradicts(&self) -> bool {
+        matches!(self.outcome, "rejected" | "restarted") || self.description == NO_OVERLAP
     }
 
     /// Returns the line of JSON.

@@ -155,8 +155,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             ));
         }
     }
-    if !lines.iter().any(|line| line.outcome == "accepted") {
-        follow.distrust(lines.len(), "an estimate is accepted");
+    let accepted = lines.iter().filter(|line| line.outcome == "accepted");
+    let since = lines.iter().skip_while(|line| line.outcome != "accepted");
+    let against = since.filter(|line| line.contradicts()).count();
+    match accepted.count() {
+        0 => follow.distrust(lines.len(), "an estimate is accepted"),
+        accepted if against >= accepted => warn(format_args!(
+            "{output}: {against} of {} contradict the pose that moved with the camera: check \
+             cam_R_w2c and cam_t_w2c (camera from world, mm) in {}, and that the object stands still",
+            counted(lines.len(), "image"),
+            scene.file("scene_camera").display()
+        )),
+        _ => {}
     }
     let damaged = faults::report(tracker.faults.iter(), [].iter());
     if damaged > 0 {

@@ -5,7 +5,7 @@ use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::fusion::CameraMotion;
 use hybrid_icp::{Preset, Refiner, SequentialEstimator, Warning, warnings};
 
-use super::line::Line;
+use super::line::{Line, NO_OVERLAP};
 
 /// Feeds the images of a scene to an estimator.
 pub(super) struct Tracker<'a> {
@@ -51,9 +51,7 @@ impl<'a> Tracker<'a> {
             .unwrap_or_else(|status| {
                 let why = match status {
                     RowStatus::NoMask => "moved with the camera: no mask of the object",
-                    RowStatus::NoOverlap => {
-                        "moved with the camera: no overlap with a mask of the object"
-                    }
+                    RowStatus::NoOverlap => NO_OVERLAP,
                     RowStatus::MissingFrame => "moved with the camera: no depth image",
                     _ => "moved with the camera: damaged file",
                 };

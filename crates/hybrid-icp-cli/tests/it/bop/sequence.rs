@@ -146,7 +146,7 @@ fn impossible_scales_and_sizes_are_warned_of() {
     };
     let none = format!(
         "warning: out.jsonl: an estimate is accepted in none of its 7 images: do not trust its poses, \
-         and check {INITIAL}, and that --init is in mm\n"
+         and check {INITIAL}, that --init is in mm, and cam_K and depth_scale in scene_camera.json\n"
     );
     let none = none.as_str();
     assert_eq!(scaled(2.0).err, none);
@@ -175,6 +175,30 @@ fn impossible_scales_and_sizes_are_warned_of() {
         "{told}"
     );
     assert!(!told.contains("is in mm"), "{told}");
+}
+
+/// The motion of the camera has no other check than the images.
+#[test]
+fn wrong_camera_motions_are_warned_of() {
+    let folder = cars();
+    let text = folder.read(CAMERAS);
+    let in_meters = |t: &mut Value| *t = (t.as_f64().unwrap() / 1e3).into();
+    let inverted = |camera: &mut Value| {
+        let r = camera["cam_R_w2c"].clone();
+        for i in 0..9 {
+            camera["cam_R_w2c"][i] = r[3 * (i % 3) + i / 3].clone();
+        }
+    };
+    let meters = |camera: &mut Value| (0..3).for_each(|i| in_meters(&mut camera["cam_t_w2c"][i]));
+    let changes: [&dyn Fn(&mut Value); 2] = [&meters, &inverted];
+    for change in changes {
+        folder.write(CAMERAS, &text);
+        folder.change_json(CAMERAS, |value| {
+            value.as_object_mut().unwrap().values_mut().for_each(change);
+        });
+        let told = sequence(&folder, INITIAL, "").exits(0);
+        told.complains(&["of 7 images contradict", "cam_t_w2c", "stands still"]);
+    }
 }
 
 #[test]

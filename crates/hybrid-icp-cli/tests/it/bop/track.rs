@@ -82,7 +82,7 @@ fn a_start_far_from_the_object_is_warned_of() {
     let words = TRACK.replace("set/initial_synthetic-test.csv", "init.json --init-unit m");
     folder.command(words).warns(&[
         "tracked in none of its 2 images",
-        "check init.json, and --init-unit",
+        "check init.json, --init-unit, and cam_K and depth_scale",
     ]);
 }
 
