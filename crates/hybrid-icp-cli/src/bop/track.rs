@@ -12,12 +12,12 @@ use hybrid_icp::core::{DepthImage, Isometry3, Model, PinholeCamera};
 use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
 use serde_json::{Value, json};
 
-use super::faults;
 use super::follow::FollowOptions;
 use super::statistics::{count, median};
+use super::{faults, models};
 use crate::options::positive;
 use crate::pose_json::add_pose;
-use crate::terminal::{counted, progress_bar, say};
+use crate::terminal::{counted, progress_bar, say, warn};
 
 /// Track a moving object through the images of a scene, without masks.
 ///
@@ -72,7 +72,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .get(scene_id)
         .map_err(|fault| Error::msg(fault.text))?;
     let images = follow.images(&scene)?;
-    let model = &follow.model(&dataset.models_dir()?)?.by_id[&object];
+    let models = follow.model(&dataset.models_dir()?)?;
+    let model = &models.by_id[&object];
     let start = follow.initial_pose(images[0])?;
     let progress = progress_bar(images.len(), "images");
     let (lines, faults) = arguments.track(&scenes, &images, model, &start)?;
@@ -88,6 +89,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         counted(lines.len(), "image"),
         summarize(&lines),
     ))?;
+    let diameters = models::wrong_diameters(&models, &dataset.models_info_path()?);
+    diameters.values().for_each(warn);
     let tracking = |line: &Line| line.tracked.state == TrackState::Tracking;
     if !lines.iter().any(tracking) {
         follow.distrust(lines.len(), "the object is tracked");

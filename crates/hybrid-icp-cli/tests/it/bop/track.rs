@@ -79,8 +79,11 @@ fn a_start_far_from_the_object_is_warned_of() {
     let init = read_results(folder.path("set/initial_synthetic-test.csv")).unwrap();
     let pose = pose_json(&init[0].camera_from_object());
     folder.write("init.json", pose.to_string());
+    let info = "set/models/models_info.json";
+    folder.change_json(info, |value| value["1"]["diameter"] = 1.into());
     let words = TRACK.replace("set/initial_synthetic-test.csv", "init.json --init-unit m");
     folder.command(words).warns(&[
+        "models_info.json: object 1: the stated diameter is 0.0010 m",
         "tracked in none of its 2 images",
         "check init.json, --init-unit, and cam_K and depth_scale",
     ]);
