@@ -146,6 +146,7 @@ pub(crate) fn refuse(path: &Path, head: &[u8], expected: &str) -> IoError {
     let format = Format::of(head);
     let found = format.map_or("data of an unknown format", Format::name);
     let advice = match format {
+        None if head.is_empty() => return IoError::new(path, None, "an empty file", expected),
         Some(format) => format.conversion().map(str::to_owned),
         None => Some(
             "raw numbers need their shape; np.save(\"array.npy\", \

@@ -45,7 +45,7 @@ pub(crate) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<V
                 return Err(format::refuse(path, &content, expected));
             };
             match (format, lines_of_numbers(text)) {
-                _ if text.trim().is_empty() => json::parse(path, text.as_bytes()),
+                _ if text.trim().is_empty() => Err(IoError::new(path, None, "no text", expected)),
                 (None, Some(lines)) => Ok(lines),
                 #[cfg(feature = "xml")]
                 (Some(Format::Xml), _) => xml::parse(path, text),
@@ -83,7 +83,11 @@ fn lines_of_numbers(text: &str) -> Option<Value> {
     let numbers = |line: &str| -> Option<Value> {
         let words = line.split(is_separator).filter(|word| !word.is_empty());
         words
-            .map(|word| word.parse::<f64>().ok().map(Value::from))
+            // A number that is not finite stays as it is written, for the message.
+            .map(|word| match word.parse::<f64>().ok()? {
+                number if number.is_finite() => Some(Value::from(number)),
+                _ => Some(Value::from(word)),
+            })
             .collect()
     };
     let lines: Option<Vec<Value>> = lines

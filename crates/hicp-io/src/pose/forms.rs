@@ -1,8 +1,9 @@
 //! Poses as matrices, quaternions and TUM lines.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
-use hicp_core::{Matrix3, Quaternion, UnitQuaternion, rotation_from_matrix};
+use hicp_core::{Matrix3, Quaternion, UnitQuaternion, Vector3, rotation_from_matrix};
 use serde_json::Value;
 
 use super::bop::{PoseFile, pose, pose_to_bop};
@@ -12,8 +13,8 @@ use crate::limits::ReadLimits;
 use crate::unit::LengthUnit;
 
 /// The supported forms, for messages.
-const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, t and a quaternion of stated order \
-                        (quaternion_xyzw or quaternion_wxyz), or a TUM line (t x y z qx qy qz qw)";
+const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, t and rvec or a quaternion of stated \
+                        order (quaternion_xyzw or quaternion_wxyz), or a TUM line (t x y z qx qy qz qw)";
 
 /// Reads a pose in any common form, as JSON, YAML, XML, text or NPY.
 ///
@@ -23,6 +24,7 @@ const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, t an
 ///   `translation`, `position`, `cam_t_m2c`).
 /// - An object with a translation and a quaternion: `quaternion_xyzw`, `quaternion_wxyz`, or
 ///   `quaternion`, `orientation` or `rotation` with the members x, y, z and w.
+/// - An object with a translation and `rvec`, a rotation vector in radians as in OpenCV.
 /// - A pose or one transform of ROS, such as a `TFMessage` with one entry.
 /// - A TUM line of text: the time, if any, then x, y, z, qx, qy, qz, qw.
 ///
@@ -125,6 +127,15 @@ fn form(root: &Value) -> Option<Result<Parts, String>> {
     } else if let Some(wxyz) = member(&["quaternion_wxyz", "quat_wxyz"]) {
         let [w, x, y, z] = four(wxyz)?;
         quaternion([x, y, z, w])
+    } else if let Some(rvec) = member(&["rvec"]) {
+        let rvec = Vector3::from(xyz(rvec)?);
+        match rvec.norm() <= TAU {
+            true => Ok(UnitQuaternion::from_scaled_axis(rvec)),
+            false => Err(format!(
+                "an rvec of the length {}, which must be in radians",
+                rvec.norm()
+            )),
+        }
     } else {
         let keys = ["cam_R_m2c", "R", "rotation", "orientation", "quaternion"];
         let value = member(&keys)?;

@@ -135,6 +135,7 @@ fn a_number_that_is_missing_or_wrong_is_named() {
             r#"{"fx": 600, "fy": 600, "ppx": 1e12, "ppy": 240}"#,
             ["$.ppx:", "cx is 1000000000000"],
         ),
+        (" \n", ["found no text", "a camera as JSON"]),
     ] {
         let path = folder.write("camera.json", text);
         let error = read_camera(&path, (640, 480)).unwrap_err();
@@ -179,6 +180,7 @@ fn poses_of_every_form_are_the_same() {
         "pose_tum.txt",
         "pose_wxyz.json",
         "pose_xyzw.json",
+        "pose_rvec.json",
         "pose_ros.yaml",
         "pose_tf.json",
     ] {
@@ -203,6 +205,19 @@ fn a_quaternion_of_unknown_order_and_other_files_are_refused() {
         ("photo.jpg", "a JPEG image"),
     ] {
         refused(read_pose(fixture(name), None), &[name, found]);
+    }
+    let folder = Folder::new();
+    for (text, found) in [
+        ("nan 0 0 0\n0 1 0 0\n0 0 1 1\n", "[[\"nan\",0.0"),
+        (
+            r#"{"rvec": [90, 0, 0], "tvec": [0, 0, 1]}"#,
+            "must be in radians",
+        ),
+    ] {
+        refused(
+            read_pose(folder.write("T.txt", text), None),
+            &["T.txt", found],
+        );
     }
 }
 

@@ -91,6 +91,9 @@ fn files_that_cannot_be_depth_are_refused_with_advice() {
     ] {
         refused(read_depth(fixture(name), Some(1.0)), &[name, found, advice]);
     }
+    let folder = Folder::new();
+    let empty = read_depth(folder.write("depth.png", ""), Some(1.0));
+    refused(empty, &["depth.png: found an empty file"]);
 }
 
 /// Asserts that a mask selects the object, without a warning.
