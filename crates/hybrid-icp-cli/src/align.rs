@@ -49,8 +49,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "UNIT", requires = "init")]
     init_unit: Option<LengthUnit>,
     /// The error to minimize: point-to-point, point-to-plane or gicp.
-    #[arg(long, value_name = "NAME", default_value_t = Registration::default().name().to_owned())]
-    method: String,
+    #[arg(long, value_name = "NAME", default_value = Registration::default().name())]
+    method: Registration,
     /// Largest distance of a pair, meters. If not given: a tenth of the source's diameter, then a
     /// fiftieth.
     #[arg(long, value_name = "METERS", value_parser = positive)]
@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .reads("TARGET", [&arguments.target])
         .reads("--init", init)
         .check_in_place("--output", "--init")?;
-    let method: Registration = arguments.method.parse()?;
+    let method = arguments.method;
     #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
     let meters = |length: Option<f64>| length.map(|length| length as f32);
     let options = CloudOptions {
@@ -120,6 +120,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let in_words = |warning: &CloudWarning| match warning {
         CloudWarning::Extents { .. } => {
             format!("{warning}: check --unit {unit} and --target-unit {target_unit}")
+        }
+        CloudWarning::LittleOverlap { .. } if found.outcome.n_pairs() == 0 => {
+            format!("{warning}: check --init and its unit, --unit {unit} and --max-distance")
         }
         _ => warning.to_string(),
     };

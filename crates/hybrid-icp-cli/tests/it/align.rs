@@ -71,7 +71,7 @@ fn clouds_that_do_not_overlap_are_warned_of() {
         (&json!("kept_initial"), &Value::Null)
     );
     assert_eq!(found["termination"], "no_pairs");
-    assert_contains(&run_.err, &["do not trust the pose"]);
+    assert_contains(&run_.err, &["do not trust the pose: check --init"]);
     let run_ = folder
         .command("align a.ply b.pcd --target-unit mm")
         .exits(0);
