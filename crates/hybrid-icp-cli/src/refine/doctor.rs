@@ -140,7 +140,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     faults.extend(found.into_iter().map(|(fault, score)| Named {
         fault: json!(fault),
         problem: fault.to_string(),
-        fix: fault.fix(),
+        fix: match (&fault, &inputs.files.camera_from_depth) {
+            (Fault::Misaligned { .. }, Some(path)) => format!(
+                "check {}: expected the pose of the depth camera in the frame of --camera, not its inverse",
+                path.display()
+            ),
+            _ => fault.fix(),
+        },
         option: option(&fault, unit, scale),
         score,
     }));

@@ -199,7 +199,11 @@ impl Fault {
             }
             Self::Misaligned { right, down } => (
                 format!(
-                    "depth image and mask are not aligned: the depth lies {right} pixels right of the mask and {down} below"
+                    "depth image and mask are not aligned: the depth lies {} pixels {} of the mask and {} {}",
+                    right.abs(),
+                    if right < 0 { "left" } else { "right" },
+                    down.abs(),
+                    if down < 0 { "above" } else { "below" }
                 ),
                 "use the mask of this depth image, or register the depth to its camera".to_owned(),
             ),

@@ -164,6 +164,13 @@ fn wrong_masks_and_images_are_named() {
     scene.write("camera.json", camera.to_string());
     names(&scene, "intrinsics", None);
 
+    let scene = Scene::new()
+        .with("--depth-camera", "camera.json")
+        .with("--camera-from-depth", "near.txt");
+    scene.write("near.txt", "1 0 0 -0.06\n0 1 0 0\n0 0 1 0\n");
+    names(&scene, "misaligned", None);
+    assert_contains(&examine(&scene).0, &["left of the mask", "check near.txt"]);
+
     let scene = Scene::new();
     let mesh = car();
     let turned = mesh
