@@ -75,6 +75,20 @@ def test_the_sequential_estimator_warns_of_the_first_pose_and_states_its_place(s
     assert repr(estimator).startswith("SequentialEstimator('average', estimated, t = (0.0")
 
 
+def test_the_sequential_estimator_warns_of_a_wrong_motion(scene):
+    arguments = hi.Pipeline("hybrid"), "weighted-average", scene.model, scene.rough
+    estimator = hi.SequentialEstimator(*arguments, covariance="calibrated")
+    motion = pose([0.0, 0.0, 0.0], [0.0, 0.0, 0.02])
+    true, steps = scene.true, []
+    with pytest.warns(hi.InputWarning, match="check that T_nc is the next camera from"):
+        for _ in range(4):
+            depth = hi.render_depth(scene.model, scene.camera, true)
+            observation = hi.Observation(depth, depth > 0, scene.camera)
+            steps.append(estimator.step(observation, np.linalg.inv(motion) if steps else None))
+            true = motion @ true
+    assert [step.event for step in steps] == ["accepted", "rejected", "rejected", "restarted"]
+
+
 def test_a_calibrated_covariance_is_at_least_the_error_of_models(scene):
     def deviation(**options):
         arguments = hi.Pipeline("hybrid"), "weighted-average", scene.model, scene.rough

@@ -1072,7 +1072,8 @@ class SequentialEstimator:
         Warns
         -----
         InputWarning
-            As for `Pipeline.refine`, while there is no estimate.
+            As for `Pipeline.refine`, while there is no estimate. If the event is "restarted",
+            because the images contradict `T_nc`.
         """
 
     def move_camera(self, T_nc: npt.ArrayLike, covariance: npt.ArrayLike | None=None) -> None:

@@ -2,8 +2,8 @@
 
 use std::sync::Mutex;
 
-use hybrid_icp::fusion::FusionMethod;
-use hybrid_icp::{Calibration, SequentialEstimator};
+use hybrid_icp::fusion::{FusionMethod, Update};
+use hybrid_icp::{Calibration, SequentialEstimator, SequentialEvent};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, Motion};
@@ -105,7 +105,8 @@ impl PySequentialEstimator {
     /// Warns
     /// -----
     /// InputWarning
-    ///     As for `Pipeline.refine`, while there is no estimate.
+    ///     As for `Pipeline.refine`, while there is no estimate. If the event is "restarted",
+    ///     because the images contradict `T_nc`.
     #[pyo3(signature = (observation, T_nc = None, covariance = None))]
     fn step<'py>(
         &self,
@@ -129,6 +130,12 @@ impl PySequentialEstimator {
         let (model, observation) = (&model.model, &observation.observation);
         // Release the GIL first: another thread may hold the lock for a whole step.
         let step = py.detach(|| locked(&self.estimator).step(model, observation, &motion));
+        if let SequentialEvent::Estimated(Update::Restarted(..)) = step.event {
+            let text = "the fuser started again, because the last images contradict the pose that \
+                        moved with the camera: check that T_nc is the next camera from the camera, \
+                        in meters, and that the object stands still";
+            errors::warn(py, text)?;
+        }
         results::sequential_step(py, &step)
     }
 
