@@ -95,10 +95,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if !lines.iter().any(tracking) {
         follow.distrust(lines.len(), "the object is tracked");
     }
-    let damaged = faults::report(faults.iter(), [].iter());
-    if damaged > 0 {
+    if let Some(damaged) = faults::report(faults.iter(), [].iter()) {
         bail!(
-            "{damaged} files could not be used; in their images, {} has a predicted pose",
+            "{damaged}; in their images, {} has a predicted pose",
             follow.output.display()
         );
     }

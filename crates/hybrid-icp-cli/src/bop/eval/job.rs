@@ -158,9 +158,8 @@ impl EvalJob {
             say(report.table())?;
         }
         let faults = judged.iter().flat_map(|image| &image.faults);
-        let damaged = faults::report(faults, models.broken.values());
-        if damaged > 0 {
-            bail!("{damaged} files could not be used; their targets are left out of the results");
+        if let Some(damaged) = faults::report(faults, models.broken.values()) {
+            bail!("{damaged}; their targets are left out of the results");
         }
         if is_empty {
             bail!(

@@ -148,10 +148,10 @@ pub(super) fn report_faults(
     if lacks_masks {
         warn("rows without a mask of the ground truth need --detections FILE or --mask none");
     }
-    if damaged > 0 {
+    if let Some(damaged) = damaged {
         let of_damaged = rows_of(results).filter(|row| row.status == RowStatus::Damaged);
         bail!(
-            "{damaged} files could not be used; {} rows are {unused} in {}",
+            "{damaged}; {} rows are {unused} in {}",
             of_damaged.count(),
             job.output.display()
         );

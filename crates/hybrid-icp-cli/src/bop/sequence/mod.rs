@@ -168,9 +168,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         )),
         _ => {}
     }
-    let damaged = faults::report(tracker.faults.iter(), [].iter());
-    if damaged > 0 {
-        bail!("{damaged} files could not be used; {output} has no estimate for their images");
+    if let Some(damaged) = faults::report(tracker.faults.iter(), [].iter()) {
+        bail!("{damaged}; {output} has no estimate for their images");
     }
     Ok(())
 }

@@ -152,8 +152,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "{names}\n{}\n{out}",
         table(&grid(&estimates, &lines), 0)
     ))?;
-    if damaged > 0 {
-        bail!("{damaged} files could not be used; {out} is without what depends on them");
+    if let Some(damaged) = damaged {
+        bail!("{damaged}; {out} is without what depends on them");
     }
     Ok(())
 }

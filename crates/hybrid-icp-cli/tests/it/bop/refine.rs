@@ -226,7 +226,7 @@ fn errors_are_reported_even_if_the_summary_cannot_be_written() {
     told().complains(&[
         "warning: depth image is missing",
         "error: ./test/000003/depth/000040.png",
-        "error: 1 files could not be used",
+        "error: 1 file could not be used",
     ]);
     // Without the damaged file, the summary is the only error.
     world.remove(&depth);
@@ -249,7 +249,7 @@ fn damaged_files_are_reported_and_the_rest_is_written() {
         let whole = world.bytes(&path);
         world.write(&path, &whole[..whole.len() / 3]);
         let (run, refined) = world.refine(&rows, "");
-        let run = run.fails(&["error: ", name, "1 files could not be used", "out.csv"]);
+        let run = run.fails(&["error: ", name, "1 file could not be used", "out.csv"]);
         run.prints(&["kept: damaged file"]);
         let changed = rows.iter().zip(&refined).filter(|(a, b)| !same_pose(a, b));
         let changed: Vec<_> = changed.collect();

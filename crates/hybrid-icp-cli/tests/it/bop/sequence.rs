@@ -233,7 +233,7 @@ fn images_without_the_object_move_the_pose_with_the_camera() {
 
     // A damaged image has no estimate and is reported. The lines of the other images are written.
     folder.write(scene_dir.join("depth/000005.png"), "no image");
-    sequence(&folder, INITIAL, "").fails(&["000005.png", "1 files could not be used"]);
+    sequence(&folder, INITIAL, "").fails(&["000005.png", "1 file could not be used"]);
     let damaged = lines(&folder);
     assert_eq!(
         (damaged.len(), &damaged[5]["outcome"]),

@@ -281,7 +281,7 @@ fn images_that_cannot_be_shown_are_refused() {
     let whole = world.bytes(&mask);
     world.write(&mask, &whole[..whole.len() / 3]);
     let told = show(&world, "--results truth.csv").exits(1);
-    let told = told.complains(&["mask_visib/000040_000001.png", "1 files could not be used"]);
+    let told = told.complains(&["mask_visib/000040_000001.png", "1 file could not be used"]);
     let found = cells(&told);
     assert_eq!(found["2"][1..], ["–", "0.00", "0.000"]);
     assert!(found["1a"][1] != "–" && world.path("show.png").exists());

@@ -111,7 +111,7 @@ fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
     let parts = ["rgb/000040.png", "PNG, JPEG or TIFF", "by depth alone"];
     damaged
         .fails(&parts)
-        .complains(&["1 files could not be used; 0 rows are unchanged"]);
+        .complains(&["1 file could not be used; 0 rows are unchanged"]);
     let (_, refined) = world.refine(&rows, "--models models_color --no-color");
     for (color, depth) in refined.iter().zip(&depth_only) {
         let (a, b) = (color.camera_from_object(), depth.camera_from_object());

@@ -187,7 +187,7 @@ fn damaged_files_are_reported_and_the_rest_is_evaluated() {
         let run = eval(&world, "").exits(1);
         let run = run
             .complains(parts)
-            .complains(&["error: 1 files could not be used"]);
+            .complains(&["error: 1 file could not be used"]);
         let report = world.json("out.json");
         assert_eq!(report["targets"], json!(left), "{}", run.err);
         assert_eq!(recalls(&report), [1.0; 5]);
