@@ -286,7 +286,7 @@ impl PinholeCamera {
 pub enum CameraError {
     /// A focal length is not positive or outside the accepted range.
     #[error(
-        "focal length {name} is {}, expected a number of pixels above 0, {} to {}",
+        "focal length {name} is {}, expected {} to {} pixels",
         Number(*value),
         MIN_FOCAL_LENGTH,
         MAX_FOCAL_LENGTH

@@ -130,7 +130,7 @@ fn the_longest_focal_length_is_accepted_and_stated_in_errors() {
     };
     assert_eq!(
         told(2e9, 0.0),
-        "focal length fx is 2000000000, expected a number of pixels above 0, 0.001 to 1000000000"
+        "focal length fx is 2000000000, expected 0.001 to 1000000000 pixels"
     );
     assert_eq!(
         told(1.0, -2e9),
