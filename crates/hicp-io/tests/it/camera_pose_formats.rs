@@ -208,7 +208,7 @@ fn a_quaternion_of_unknown_order_and_other_files_are_refused() {
     }
     let folder = Folder::new();
     for (text, found) in [
-        ("nan 0 0 0\n0 1 0 0\n0 0 1 1\n", "[[\"nan\",0.0"),
+        ("nan 0 0 0\n0 1 0 0\n0 0 1 1\n", r#"[[\"nan\",0.0"#),
         (
             r#"{"rvec": [90, 0, 0], "tvec": [0, 0, 1]}"#,
             "must be in radians",
