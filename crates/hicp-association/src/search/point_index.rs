@@ -16,9 +16,9 @@ pub(crate) trait PointIndex: Send + Sync + 'static {
 
     /// Returns the index of the point nearest to `query`.
     ///
-    /// Returns `None` if no point is at a finite distance. `near` is what an earlier query
-    /// to the same points left, or [`Neighborhood::UNKNOWN`]. The result does not depend on it.
-    /// `point` returns a point by its index.
+    /// Returns `None` if no point is at a finite distance. `near` is what an earlier query to the
+    /// same points left, or [`Neighborhood::UNKNOWN`]. The result does not depend on it. `point`
+    /// returns a point by its index.
     #[inline(always)]
     fn nearest_to_moved(
         &self,
