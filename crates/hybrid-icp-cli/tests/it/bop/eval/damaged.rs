@@ -172,7 +172,7 @@ fn damaged_files_are_reported_and_the_rest_is_evaluated() {
         (
             camera.clone(),
             replaced(&camera, "[400,", "[0,"),
-            &["scene_camera.json, $.0.cam_K", "fx is 0", "above 0"],
+            &["scene_camera.json, $.0.cam_K", "fx is 0", "0.001 to"],
             8,
         ),
         (
