@@ -138,7 +138,7 @@ fn associate_projective(mut ready: Ready) -> Ready {
 }
 
 #[library_benchmark]
-#[bench::mug(setup = nearest, config = limit(1_491_872))]
+#[bench::mug(setup = nearest, config = limit(3_840_091))]
 fn associate_nearest_neighbor(mut ready: Ready) -> Ready {
     pair(&mut ready, &mut NearestNeighbor::default());
     black_box(ready)
@@ -177,7 +177,7 @@ fn warm() -> (Case, Refiner) {
 }
 
 #[library_benchmark]
-#[bench::hybrid_mug(setup = warm, config = limit(13_982_721))]
+#[bench::hybrid_mug(setup = warm, config = limit(21_370_982))]
 fn pipeline(state: (Case, Refiner)) -> (Case, Refiner, Refinement) {
     let (case, mut refiner) = state;
     let refined = refiner.refine(&case.scene.model, &case.scene.observation, &case.init);
