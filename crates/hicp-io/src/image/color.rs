@@ -92,7 +92,7 @@ fn depth_pixels(path: &Path) -> IoError {
 
 fn decode_png(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<ColorImage, IoError> {
     let transformations = Transformations::EXPAND | Transformations::STRIP_16;
-    let image = pixels::decode(limits, path, content, transformations, false)?;
+    let image = pixels::decode(limits, path, content, transformations)?;
     // The bit depth and the color type of the header; the decoder has removed the low bytes.
     if let Some([16, 0]) = content.get(24..26) {
         return Err(depth_pixels(path));

@@ -16,9 +16,7 @@ pub(super) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<R
     let (head, _) = read_head(path)?;
     let content = || limits.read_bytes(path);
     match Format::of(&head) {
-        Some(Format::Png) => {
-            pixels::read(limits, path, Transformations::IDENTITY, false).map(Into::into)
-        }
+        Some(Format::Png) => pixels::read(limits, path, Transformations::IDENTITY).map(Into::into),
         Some(Format::Netpbm) => netpbm::decode(limits, path, &content()?),
         Some(Format::Bmp) => bmp::decode(limits, path, &content()?),
         #[cfg(feature = "exr")]

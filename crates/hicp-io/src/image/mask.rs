@@ -30,7 +30,7 @@ impl ReadLimits {
     /// As for [`read_mask_png`].
     pub fn read_mask_png(&self, path: impl AsRef<Path>) -> Result<Mask, IoError> {
         let path = path.as_ref();
-        let image = pixels::read(self, path, Transformations::EXPAND, false)?;
+        let image = pixels::read(self, path, Transformations::EXPAND)?;
         let sample_bytes = 1 + usize::from(image.depth == BitDepth::Sixteen);
         let samples = image.color.samples();
         let has_alpha = matches!(image.color, ColorType::GrayscaleAlpha | ColorType::Rgba);

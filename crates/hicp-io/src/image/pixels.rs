@@ -58,19 +58,17 @@ pub(super) fn read(
     limits: &ReadLimits,
     path: &Path,
     transformations: Transformations,
-    only_depth: bool,
 ) -> Result<Pixels, IoError> {
     let content = limits.read_bytes(path)?;
-    decode(limits, path, &content, transformations, only_depth)
+    decode(limits, path, &content, transformations)
 }
 
-/// Decodes a PNG file. If `only_depth` is set, refuses all pixel types except 16-bit gray.
+/// Decodes a PNG file.
 pub(super) fn decode(
     limits: &ReadLimits,
     path: &Path,
     content: &[u8],
     transformations: Transformations,
-    only_depth: bool,
 ) -> Result<Pixels, IoError> {
     let available = content.len() as u64;
     // The decoder's own limit covers only its working memory. The limit of this crate, below,
@@ -84,12 +82,6 @@ pub(super) fn decode(
     let header = decoder.read_header_info().map_err(failed)?;
     let (width, height) = header.size();
     let indexed = header.color_type == ColorType::Indexed;
-    if only_depth
-        && (header.color_type, header.bit_depth) != (ColorType::Grayscale, BitDepth::Sixteen)
-    {
-        let found = describe(header.color_type, header.bit_depth);
-        return Err(IoError::new(path, None, found, "16-bit gray pixels"));
-    }
     let (size, raw) = ((width.into(), height.into()), header.raw_bytes() as u64);
     check_size(limits, (path, 16), size, raw, available)?;
 
@@ -172,15 +164,4 @@ pub(super) fn write(
 fn failed(path: &Path, error: DecodingError) -> IoError {
     let found = "data that are not a complete PNG image";
     IoError::new(path, None, found, "a PNG image").with_source(error)
-}
-
-fn describe(color: ColorType, depth: BitDepth) -> String {
-    let color = match color {
-        ColorType::Grayscale => "gray",
-        ColorType::Rgb => "RGB",
-        ColorType::Indexed => "palette",
-        ColorType::GrayscaleAlpha => "gray + alpha",
-        ColorType::Rgba => "RGBA",
-    };
-    format!("{}-bit {color} pixels", depth as u8)
 }
