@@ -35,81 +35,60 @@ pub(crate) enum Format {
 
 use Format::*;
 
-/// The first bytes of each format. The first entry that fits counts.
-const STARTS: [(&[u8], Format); 32] = [
-    (b"\x89PNG\r\n\x1a\n", Png),
-    (b"II*\0", Tiff),
-    (b"MM\0*", Tiff),
-    (b"II+\0", Tiff),
-    (b"MM\0+", Tiff),
-    (b"\x93NUMPY", Npy),
-    (b"PK\x03\x04", Npz),
-    (b"PK\x05\x06", Npz),
-    (b"\x76\x2f\x31\x01", Exr),
-    (b"\xff\xd8\xff", Jpeg),
-    (b"Pf", Netpbm),
-    (b"PF", Netpbm),
-    (b"P5", Netpbm),
-    (b"BM", Bmp),
-    (b"GIF8", Gif),
-    (b"RIFF", WebP),
-    (b"glTF", Glb),
-    (b"\x89HDF\r\n\x1a\n", Hdf5),
-    (b"PCLZF", Pclzf),
-    (b"MATLAB", Matlab),
-    (b"#ROSBAG", RosBag),
-    (b"\x89MCAP", RosBag),
-    (b"\x1f\x8b", Gzip),
-    (b"\x80\x02", Pickle),
-    (b"\x80\x03", Pickle),
-    (b"\x80\x04", Pickle),
-    (b"\x80\x05", Pickle),
-    (b"ply", Ply),
-    (b"# .PCD", Pcd),
-    (b"VERSION", Pcd),
-    (b"<?xml", Xml),
-    (b"%YAML", Yaml),
+/// The first bytes of each format, and its name with an article. The first entry that fits counts.
+const FORMATS: [(Format, &[&[u8]], &str); 22] = [
+    (Png, &[b"\x89PNG\r\n\x1a\n"], "a PNG image"),
+    (Tiff, &TIFF, "a TIFF image"),
+    (Npy, &[b"\x93NUMPY"], "a NumPy array (NPY)"),
+    (
+        Npz,
+        &[b"PK\x03\x04", b"PK\x05\x06"],
+        "a zip archive, such as NPZ",
+    ),
+    (Exr, &[b"\x76\x2f\x31\x01"], "an EXR image"),
+    (Jpeg, &[b"\xff\xd8\xff"], "a JPEG image"),
+    (Netpbm, &[b"Pf", b"PF", b"P5"], "a PGM or PFM image"),
+    (Bmp, &[b"BM"], "a BMP image"),
+    (Gif, &[b"GIF8"], "a GIF image"),
+    (WebP, &[b"RIFF"], "a WebP image"),
+    (Glb, &[b"glTF"], "a binary glTF file"),
+    (Hdf5, &[b"\x89HDF\r\n\x1a\n"], "an HDF5 file"),
+    (Pclzf, &[b"PCLZF"], "a PCLZF image of PCL"),
+    (Matlab, &[b"MATLAB"], "a MATLAB file"),
+    (RosBag, &[b"#ROSBAG", b"\x89MCAP"], "a ROS bag"),
+    (Gzip, &[b"\x1f\x8b"], "a file compressed by gzip"),
+    (Pickle, &PICKLE, "a Python pickle"),
+    (Ply, &[b"ply"], "a PLY file"),
+    (Pcd, &[b"# .PCD", b"VERSION"], "a PCD point cloud"),
+    (Xml, &[b"<?xml"], "XML"),
+    (Yaml, &[b"%YAML"], "YAML"),
+    // Its start varies.
+    (Json, &[], "JSON"),
 ];
+const TIFF: [&[u8]; 4] = [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"];
+const PICKLE: [&[u8]; 4] = [b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"];
 
 impl Format {
     /// Returns the format that the start of a file shows, if any.
     pub(crate) fn of(head: &[u8]) -> Option<Self> {
-        let known = STARTS.iter().find(|(start, _)| head.starts_with(start));
+        let fits = |starts: &[&[u8]]| starts.iter().any(|start| head.starts_with(start));
+        let known = FORMATS.iter().find(|(_, starts, _)| fits(starts));
         let json = || {
             let first = head.trim_ascii_start().first();
             first
                 .is_some_and(|byte| b"{[".contains(byte))
                 .then_some(Json)
         };
-        known.map(|(_, format)| *format).or_else(json)
+        known.map(|(format, ..)| *format).or_else(json)
     }
 
     /// Returns the name of the format with an article.
     pub(crate) fn name(self) -> &'static str {
-        match self {
-            Bmp => "a BMP image",
-            Exr => "an EXR image",
-            Gif => "a GIF image",
-            Glb => "a binary glTF file",
-            Gzip => "a file compressed by gzip",
-            Hdf5 => "an HDF5 file",
-            Jpeg => "a JPEG image",
-            Json => "JSON",
-            Matlab => "a MATLAB file",
-            Netpbm => "a PGM or PFM image",
-            Npy => "a NumPy array (NPY)",
-            Npz => "a zip archive, such as NPZ",
-            Pcd => "a PCD point cloud",
-            Pclzf => "a PCLZF image of PCL",
-            Pickle => "a Python pickle",
-            Ply => "a PLY file",
-            Png => "a PNG image",
-            RosBag => "a ROS bag",
-            Tiff => "a TIFF image",
-            WebP => "a WebP image",
-            Xml => "XML",
-            Yaml => "YAML",
-        }
+        let row = FORMATS.iter().find(|(format, ..)| *format == self);
+        let Some((.., name)) = row else {
+            unreachable!("every format has a row");
+        };
+        name
     }
 
     /// Returns how to convert a file of a format that no reader supports.
