@@ -1,6 +1,6 @@
 //! Lens distortion, removed from images when they are read.
 
-use hicp_core::{ColorImage, DepthImage, Mask, PinholeCamera};
+use hicp_core::{ColorImage, DepthImage, Mask, PinholeCamera, PixelRegion};
 
 use crate::number::whole;
 
@@ -43,23 +43,19 @@ impl Distortion {
     ///
     /// Depth is along the optical axis, so its values stay. A pixel that the real image does not
     /// show becomes missing.
-    ///
     #[must_use]
     pub fn undistort_depth(&self, camera: &PinholeCamera, depth: &DepthImage) -> DepthImage {
-        let pixels = self.sources(camera, depth.width(), depth.height());
-        let pixels = pixels.map(|source| source.and_then(|(u, v)| depth.get(u, v)));
-        let (width, height) = (depth.width(), depth.height());
-        let image = DepthImage::collect(width, height, pixels.map(Option::unwrap_or_default));
-        image.unwrap_or_else(|_| depth.clone())
+        let (width, height) = depth.size();
+        let pixels = self.moved(camera, (width, height), |u, v| depth.get(u, v));
+        DepthImage::collect(width, height, pixels).unwrap_or_else(|_| depth.clone())
     }
 
     /// Removes the distortion from a mask of `camera`, with the nearest pixel.
     #[must_use]
     pub fn undistort_mask(&self, camera: &PinholeCamera, mask: &Mask) -> Mask {
-        let pixels = self.sources(camera, mask.width(), mask.height());
-        let pixels = pixels.map(|source| source.and_then(|(u, v)| mask.get(u, v)));
-        let pixels = pixels.map(Option::unwrap_or_default).collect();
-        Mask::new(mask.width(), mask.height(), pixels).unwrap_or_else(|_| mask.clone())
+        let (width, height) = mask.size();
+        let pixels = self.moved(camera, (width, height), |u, v| mask.get(u, v));
+        Mask::new(width, height, pixels.collect()).unwrap_or_else(|_| mask.clone())
     }
 
     /// Removes the distortion from a color image of `camera`, with the nearest pixel.
@@ -67,28 +63,30 @@ impl Distortion {
     /// A pixel that the real image does not show becomes black.
     #[must_use]
     pub fn undistort_color(&self, camera: &PinholeCamera, color: &ColorImage) -> ColorImage {
-        let pixels = self.sources(camera, color.width(), color.height());
-        let pixels = pixels.map(|source| source.and_then(|(u, v)| color.get(u, v)));
-        let pixels = pixels.map(Option::unwrap_or_default).collect();
-        ColorImage::new(color.width(), color.height(), pixels).unwrap_or_else(|_| color.clone())
+        let (width, height) = color.size();
+        let pixels = self.moved(camera, (width, height), |u, v| color.get(u, v));
+        ColorImage::new(width, height, pixels.collect()).unwrap_or_else(|_| color.clone())
     }
 
-    /// Returns the pixel of the real image for each pixel of the ideal one, row by row.
-    fn sources(
+    /// Returns the nearest pixel of the real image for each pixel of the ideal one, row by row.
+    ///
+    /// A pixel that the real image does not show has the default value.
+    fn moved<T: Default>(
         &self,
         camera: &PinholeCamera,
-        width: u32,
-        height: u32,
-    ) -> impl Iterator<Item = Option<(u32, u32)>> {
+        (width, height): (u32, u32),
+        get: impl Fn(u32, u32) -> Option<T>,
+    ) -> impl Iterator<Item = T> {
         let (fx, fy, cx, cy) = (camera.fx(), camera.fy(), camera.cx(), camera.cy());
-        (0..height).flat_map(move |v| {
-            (0..width).map(move |u| {
+        PixelRegion::of_image(width, height)
+            .pixels()
+            .map(move |(u, v)| {
                 let ideal = [(f64::from(u) - cx) / fx, (f64::from(v) - cy) / fy];
                 let [x, y] = self.distort(ideal);
                 let (u, v) = ((x * fx + cx).round(), (y * fy + cy).round());
                 let inside = u >= 0.0 && v >= 0.0 && u < width.into() && v < height.into();
-                inside.then_some((whole(u), whole(v)))
+                let pixel = inside.then(|| get(whole(u), whole(v)));
+                pixel.flatten().unwrap_or_default()
             })
-        })
     }
 }
