@@ -48,18 +48,10 @@ impl ReadLimits {
 ///
 /// As for [`write_atomically`](crate::write_atomically).
 pub fn write_mask_png(path: impl AsRef<Path>, mask: &Mask) -> Result<(), IoError> {
-    write(path.as_ref(), mask)
-}
-
-fn write(path: &Path, mask: &Mask) -> Result<(), IoError> {
-    let bytes: Vec<u8> = mask
-        .pixels()
-        .iter()
-        .map(|set| u8::from(*set) * 255)
-        .collect();
-    let size = (mask.width(), mask.height());
+    let bytes = mask.pixels().iter().map(|set| u8::from(*set) * 255);
+    let bytes: Vec<u8> = bytes.collect();
     let kind = (ColorType::Grayscale, BitDepth::Eight);
-    pixels::write(path, size, kind, &bytes)
+    pixels::write(path.as_ref(), mask.size(), kind, &bytes)
 }
 
 #[cfg(test)]
