@@ -126,7 +126,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     ))?;
     say(table(&errors, 1))?;
     say(format_args!("\n{}\n", report::trace_table(&trace.stages)))?;
-    say(report::summary(&refined, &reason))?;
+    say(report::summary(&refined, &reason, false))?;
     say(format_args!(
         "{time_ms:.1} ms from depth image to pose, on one core\n{}: the model's outline before (orange, dashed) and after (blue)",
         arguments.picture.display()

@@ -86,10 +86,7 @@ impl JobOptions {
         let from = init.unwrap_or(found);
         let in_box = matches!(inputs.region, Region::Box(_));
         let reason = warnings::reason(&refined, &model, &observation, &from, in_box);
-        let summary = match init {
-            Some(_) => report::summary(&refined, &reason),
-            None => report::summary_of_estimate(&refined, &reason),
-        };
+        let summary = report::summary(&refined, &reason, init.is_none());
         let doctor = warnings::doctor(inputs);
         let mut warnings = of_files;
         warnings.extend(warnings::about_inputs(

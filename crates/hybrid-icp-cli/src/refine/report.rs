@@ -171,35 +171,21 @@ pub(crate) fn trace_table(stages: &[StageRecord]) -> String {
     table(&rows, 5)
 }
 
-/// Returns a one-line summary of an estimate.
-pub(crate) fn summary_of_estimate(found: &Refinement, reason: &str) -> String {
-    let (outcome, mve) = (&found.outcome, found.mve);
+/// Returns a one-line summary of a refinement, or of an estimate.
+pub(crate) fn summary(refined: &Refinement, reason: &str, is_estimate: bool) -> String {
+    let (outcome, mve, confidence) = (&refined.outcome, refined.mve, refined.confidence);
+    let (iterations, n_pairs) = (outcome.iterations, outcome.n_pairs());
+    let (done, before) = match is_estimate {
+        true => ("estimated", String::new()),
+        false => ("refined", format!("{:.3} -> ", refined.mve_initial)),
+    };
     match outcome.verdict {
         Verdict::Refined => format!(
-            "estimated: confidence {:.2}, MVE {mve:.3}, {} pairs, {} iterations; ended because {reason}",
-            found.confidence,
-            outcome.n_pairs(),
-            outcome.iterations,
+            "{done}: confidence {confidence:.2}, MVE {before}{mve:.3}, {n_pairs} pairs, {iterations} iterations; ended because {reason}"
         ),
-        Verdict::KeptInitial(_) => format!("found no pose: {reason}"),
-    }
-}
-
-/// Returns a one-line summary of the refinement.
-pub(crate) fn summary(refined: &Refinement, reason: &str) -> String {
-    let outcome = &refined.outcome;
-    match outcome.verdict {
-        Verdict::Refined => format!(
-            "refined: confidence {:.2}, MVE {:.3} -> {:.3}, {} pairs, {} iterations; ended because {reason}",
-            refined.confidence,
-            refined.mve_initial,
-            refined.mve,
-            outcome.n_pairs(),
-            outcome.iterations,
-        ),
+        Verdict::KeptInitial(_) if is_estimate => format!("found no pose: {reason}"),
         Verdict::KeptInitial(_) => format!(
-            "kept the initial pose: {reason}; confidence {:.2}, MVE {:.3}, {} iterations",
-            refined.confidence, refined.mve, outcome.iterations
+            "kept the initial pose: {reason}; confidence {confidence:.2}, MVE {mve:.3}, {iterations} iterations"
         ),
     }
 }
