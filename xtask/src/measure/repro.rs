@@ -4,48 +4,28 @@ use anyhow::{Context as _, Result, ensure};
 
 use crate::process::{cargo, execute};
 
-/// A study of a figure.
-struct Study {
-    figure: &'static str,
-    /// Its name in the report.
-    name: &'static str,
-    /// Its options, divided by spaces.
-    options: &'static str,
-    /// Poses per object, or trajectories per object and bin: as many as in the paper, and for
-    /// `--quick`.
-    poses: [&'static str; 2],
-}
-
-const fn study(
-    figure: &'static str,
-    name: &'static str,
-    options: &'static str,
-    poses: [&'static str; 2],
-) -> Study {
-    Study {
-        figure,
-        name,
-        options,
-        poses,
-    }
-}
+/// A study of a figure: the figure, its name in the report, and its options, divided by spaces.
+///
+/// Then the poses per object, or the trajectories per object and bin: as many as in the paper, and
+/// for `--quick`.
+type Study = (&'static str, &'static str, &'static str, [&'static str; 2]);
 
 /// The variants whose normals matter.
 const NORMALS: &str = "depth-noise --set normal_window=1 --variants \
     projective-point-to-plane,projective-cascade-point-plane,nn-point-to-plane,hybrid";
 
 const STUDIES: [Study; 11] = [
-    study("fig6", "init-noise", "init-noise", ["1000", "30"]),
-    study("fig6", "depth-noise", "depth-noise", ["100", "10"]),
-    study("fig6", "model-noise", "model-noise", ["100", "10"]),
-    study(MESHES, "meshes-init-noise", "init-noise", ["100", "10"]),
-    study(MESHES, "meshes-depth-noise", "depth-noise", ["100", "3"]),
-    study(MESHES, "meshes-model-noise", "model-noise", ["100", "3"]),
-    study("normals", "depth-noise-3x3", NORMALS, ["100", "10"]),
-    study("table1", "timing", "timing", ["100", "10"]),
-    study("alpha", "alpha", "alpha", ["1000", "30"]),
-    study("fig7", "sequential", "sequential", ["5", "1"]),
-    study(
+    ("fig6", "init-noise", "init-noise", ["1000", "30"]),
+    ("fig6", "depth-noise", "depth-noise", ["100", "10"]),
+    ("fig6", "model-noise", "model-noise", ["100", "10"]),
+    (MESHES, "meshes-init-noise", "init-noise", ["100", "10"]),
+    (MESHES, "meshes-depth-noise", "depth-noise", ["100", "3"]),
+    (MESHES, "meshes-model-noise", "model-noise", ["100", "3"]),
+    ("normals", "depth-noise-3x3", NORMALS, ["100", "10"]),
+    ("table1", "timing", "timing", ["100", "10"]),
+    ("alpha", "alpha", "alpha", ["1000", "30"]),
+    ("fig7", "sequential", "sequential", ["5", "1"]),
+    (
         "fig7-improved",
         "sequential-improved",
         "sequential --protocol improved",
@@ -61,10 +41,9 @@ const MESH_FOLDERS: [&str; 2] = ["meshes/public_ycb_ccby4", "meshes/public_small
 pub(crate) fn run(figure: &str, quick: bool) -> Result<()> {
     let folder = format!("target/study/{figure}{}", if quick { "-quick" } else { "" });
     let mut folders = Vec::new();
-    for study in STUDIES.iter().filter(|study| study.figure == figure) {
-        let out = format!("{folder}/{}", study.name);
-        let poses = study.poses[usize::from(quick)];
-        let mut arguments: Vec<String> = study.options.split(' ').map(str::to_owned).collect();
+    for (_, name, options, poses) in STUDIES.iter().filter(|study| study.0 == figure) {
+        let (out, poses) = (format!("{folder}/{name}"), poses[usize::from(quick)]);
+        let mut arguments: Vec<String> = options.split(' ').map(str::to_owned).collect();
         arguments.extend(["--poses", poses, "--out", &out, "--resume"].map(str::to_owned));
         if figure == MESHES {
             let data = std::env::var("HICP_DATA").context("HICP_DATA: expected a folder")?;
@@ -78,7 +57,7 @@ pub(crate) fn run(figure: &str, quick: bool) -> Result<()> {
         experiment(&arguments)?;
         folders.push(out);
     }
-    let known: Vec<&str> = STUDIES.iter().map(|study| study.figure).collect();
+    let known: Vec<&str> = STUDIES.iter().map(|study| study.0).collect();
     ensure!(
         !folders.is_empty(),
         "repro: expected one of {}, found {figure}",
