@@ -6,4 +6,3 @@ pub(crate) mod instructions;
 pub(crate) mod peers;
 pub(crate) mod repro;
 pub(crate) mod scale;
-mod scale_ray;

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::scale_ray;
 use crate::process::{cargo, execute, target};
+use crate::{python, root};
 
 /// 20 scenes of 10 images, 6 objects per image and 20 starts per object give more than 20,000 rows.
 const GENERATE: &str =
@@ -49,19 +49,19 @@ pub(crate) fn run(options: &[&str]) -> Result<()> {
     scale.generate()?;
     let seconds = scale.refine("whole.csv", &format!("--limit {rows} --threads {threads}"))?;
     if ray {
-        return scale_ray::run(&scale, seconds);
+        return scale.compare_with_ray(seconds);
     }
     scale.compare(seconds)
 }
 
 /// The runs of one command line.
-pub(crate) struct Scale {
+struct Scale {
     program: PathBuf,
     /// The working folder, with the dataset in `data` and the output of the whole run in
     /// `whole.csv`.
-    pub(crate) folder: PathBuf,
-    pub(crate) rows: usize,
-    pub(crate) threads: usize,
+    folder: PathBuf,
+    rows: usize,
+    threads: usize,
 }
 
 impl Scale {
@@ -115,6 +115,23 @@ impl Scale {
             println!("{run}: the same bytes");
         }
         Ok(())
+    }
+
+    /// Runs the script that compares Ray on this machine with the output of the whole run, which
+    /// took some seconds on as many threads.
+    fn compare_with_ray(&self, seconds: f64) -> Result<()> {
+        let python = python::with_module(&["--ray"], "release")?;
+        let mut script = Command::new(python);
+        script.arg(root().join(python::PACKAGE).join("benches/ray_scale.py"));
+        script.args(["data", "data/initial_synthetic-test.csv", "whole.csv"]);
+        for (option, value) in [
+            ("--rows", self.rows.to_string()),
+            ("--workers", self.threads.to_string()),
+            ("--seconds", seconds.to_string()),
+        ] {
+            script.args([option, &value]);
+        }
+        execute(script.current_dir(&self.folder))
     }
 
     fn command(&self, words: &str) -> Command {
