@@ -16,7 +16,6 @@ use hicp_benches::fused::Fused;
 use hicp_benches::instances::{Instance, instance, with_10_000_triangles};
 use hicp_benches::peer::{Failure, matrix, serve, write_floats};
 use hicp_benches::selected;
-use hicp_benches::stages::{GATE_METERS, STOP};
 use hybrid_icp::association::{
     DataAssociation, MaxDistance, NearestNeighbor, OutlierFilter, PointSelection, Projective,
     Stride, VisibleSurface,
@@ -25,12 +24,26 @@ use hybrid_icp::core::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderedView,
     Renderer, Surfel, TriMesh,
 };
-use hybrid_icp::icp::{Icp, Session, Stage, Workspace};
+use hybrid_icp::icp::{Icp, IterationLimit, Session, SmallMotion, Stage, Workspace};
 use hybrid_icp::metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, Score};
 use hybrid_icp::{Preset, presets};
 use serde_json::{Value, json};
+
+/// Maximum distance of a pair in all stages, meters.
+///
+/// It is larger than the error of any start. The other libraries use the same value.
+const GATE_METERS: f32 = 0.03;
+
+/// Stop rule: the next increment is below 0.1 mm and 0.01°, or there were 100 evaluations.
+const STOP: (SmallMotion, IterationLimit) = (
+    SmallMotion {
+        translation_meters: 1e-4,
+        rotation_degrees: 0.01,
+    },
+    IterationLimit(100),
+);
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

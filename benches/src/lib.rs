@@ -3,7 +3,6 @@
 pub mod fused;
 pub mod instances;
 pub mod peer;
-pub mod stages;
 pub mod work;
 
 use hicp_sim::{Household, perturb_by_mean, rng};
