@@ -59,7 +59,9 @@ impl<'a> Points<'a> {
         }
         if self.with_normals {
             let normal = Vector3::new(nx, ny, nz).cast::<f32>();
-            match UnitVector3::try_new(normal, 1e-6) {
+            let normal = UnitVector3::try_new(normal, 1e-6);
+            // Beyond the range of `f32`, a number is infinite, and so is the norm.
+            match normal.filter(|normal| normal.iter().all(|value| value.is_finite())) {
                 Some(normal) => self.normals.push(normal),
                 None => {
                     self.n_skipped += 1;

@@ -145,6 +145,15 @@ fn clouds_of_every_format_are_the_same() {
 }
 
 #[test]
+fn points_without_a_usable_normal_are_skipped() {
+    let folder = Folder::new();
+    // The second normal has no length, the third one is infinite as `f32`.
+    let text = "x y z nx ny nz\n0 0 1 0 0 -1\n0 0 2 0 0 0\n0 0 3 0 0 -1e39\n";
+    let cloud = read_cloud(folder.write("a.xyzn", text), LengthUnit::Meters).unwrap();
+    assert_eq!((cloud.points.len(), cloud.n_skipped), (1, 2));
+}
+
+#[test]
 fn files_that_are_no_cloud_are_refused() {
     let folder = Folder::new();
     let whole = std::fs::read(fixture("cloud_binary.pcd")).unwrap();
