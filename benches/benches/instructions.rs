@@ -138,7 +138,7 @@ fn associate_projective(mut ready: Ready) -> Ready {
 }
 
 #[library_benchmark]
-#[bench::mug(setup = nearest, config = limit(3_840_091))]
+#[bench::mug(setup = nearest, config = limit(2_549_731))]
 fn associate_nearest_neighbor(mut ready: Ready) -> Ready {
     pair(&mut ready, &mut NearestNeighbor::default());
     black_box(ready)

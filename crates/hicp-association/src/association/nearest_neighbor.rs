@@ -41,7 +41,7 @@ pub struct NearestNeighbor {
 pub enum SearchIndex {
     /// A tree of bounding boxes, eight to a node. The presets use it.
     ///
-    /// A search finds the eight nearest points. In later iterations, a point that has moved little
+    /// A search finds the four nearest points. In later iterations, a point that has moved little
     /// since compares these alone (compare Greenspan & Godin 2001). Of equally near points, the
     /// first in the image is returned. The result does not depend on earlier searches.
     #[default]

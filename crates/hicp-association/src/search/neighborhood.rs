@@ -6,7 +6,7 @@ use hicp_core::internal::stored;
 use crate::search::nearest::Nearest;
 
 /// Number of points. More answer more queries, but each takes longer.
-const POINTS: usize = 8;
+const POINTS: usize = 4;
 /// Computed distances differ from the true ones by less than this factor.
 const ROUNDING: f32 = 1.0 - 1.0e-5;
 
@@ -61,8 +61,11 @@ impl Neighborhood {
         found: &Found,
         point: impl Fn(u32) -> Point3<f32>,
     ) {
-        self.center = *query;
-        self.reach = found.last().distance_squared.sqrt();
+        *self = Self {
+            center: *query,
+            reach: found.last().distance_squared.sqrt(),
+            ..Self::UNKNOWN
+        };
         for (lane, key) in found.0.iter().enumerate() {
             let Nearest { element, .. } = Nearest::of_key(*key);
             if element != Nearest::NONE.element {
