@@ -189,8 +189,9 @@ def refine(
     bop.write_results(output, lines)
     journal.remove()
     if faults:
+        unusable = "1 file" if len(faults) == 1 else f"{len(faults)} files"
         raise InputError(
-            f"{len(faults)} files could not be used, the first: {faults[0]}; "
+            f"{unusable} could not be used, the first: {faults[0]}; "
             f"all other rows are refined in {output}"
         )
     return statuses
