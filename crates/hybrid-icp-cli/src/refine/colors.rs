@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::bail;
 use hicp_bop::chain;
 use hicp_io::{CameraFile, LengthUnit, MeshFile};
-use hybrid_icp::core::{ColorImage, Model};
+use hybrid_icp::core::{ColorImage, Model, ModelConfig, Symmetries};
 
 use crate::limits::limits;
 
@@ -15,11 +15,16 @@ use crate::limits::limits;
 pub(super) fn read_model(
     path: &Path,
     unit: LengthUnit,
+    symmetries: Symmetries,
     rgb: Option<&Path>,
 ) -> anyhow::Result<(Model, Option<String>)> {
+    let config = ModelConfig {
+        symmetries,
+        ..ModelConfig::default()
+    };
     let Some(rgb) = rgb else {
         let mesh = limits().read_mesh_geometry(path, unit)?;
-        return Ok((Model::new(mesh), None));
+        return Ok((Model::with_config(mesh, config), None));
     };
     let MeshFile { mesh, color_fault } = limits().read_mesh_file(path, unit)?;
     let warning = mesh.color().is_none().then(|| {
@@ -27,7 +32,7 @@ pub(super) fn read_model(
         let fault = color_fault.map_or(String::new(), |fault| format!(" ({})", chain(&fault)));
         format!("{model} has no colors that can be used{fault}, so --rgb {rgb} is ignored")
     });
-    Ok((Model::new(mesh), warning))
+    Ok((Model::with_config(mesh, config), warning))
 }
 
 /// Reads the color image of a camera, and removes the distortion of its lens.

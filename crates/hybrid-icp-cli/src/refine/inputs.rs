@@ -1,12 +1,15 @@
 //! The files that a refinement reads.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use clap::error::ErrorKind;
 use clap::{ArgGroup, Args};
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
-use hybrid_icp::core::{ColorImage, DepthImage, Mask, Model, Observation, PinholeCamera};
+use hybrid_icp::core::{
+    ColorImage, DepthImage, Mask, Model, Observation, PinholeCamera, Symmetries,
+};
 use hybrid_icp::{box_overlaps, mask_in_box, warning_of_box};
 
 use super::colors;
@@ -26,6 +29,10 @@ pub(crate) struct ImageFiles {
     /// m.
     #[arg(long, value_name = "UNIT")]
     pub(crate) model_unit: Option<LengthUnit>,
+    /// The symmetries of the object: a models_info.json of BOP. It has one object, or that of the
+    /// id in the mesh's name, such as obj_000005.ply.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) symmetries: Option<PathBuf>,
     /// The depth image: PNG, TIFF, NPY, NPZ, EXR, PGM or PFM. 16-bit integers with a depth scale,
     /// or floating-point meters; 0 or NaN where nothing was measured.
     #[arg(long, value_name = "FILE")]
@@ -77,6 +84,29 @@ impl ImageFiles {
                     "--model-unit <UNIT> is missing, expected the unit of the mesh: m, mm or cm\n";
                 Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text).into())
             }
+        }
+    }
+
+    /// Reads the declared symmetries of the mesh.
+    fn read_symmetries(&self) -> anyhow::Result<Symmetries> {
+        let Some(path) = &self.symmetries else {
+            return Ok(Symmetries::default());
+        };
+        let mut objects = limits().read_models_info(path)?;
+        let name = self.model.file_stem().and_then(OsStr::to_str);
+        let id = name.and_then(|name| name.strip_prefix("obj_")?.parse().ok());
+        let (file, mesh, count) = (path.display(), self.model.display(), objects.len());
+        if let Some(id) = id {
+            let object = objects.remove(&id);
+            return object
+                .map(|object| object.symmetries)
+                .with_context(|| format!("{file}: no object {id}, expected that of {mesh}"));
+        }
+        match objects.pop_first() {
+            Some((_, object)) if objects.is_empty() => Ok(object.symmetries),
+            _ => bail!(
+                "{file}: found {count} objects, expected one, or a mesh with an id in its name, such as obj_000005.ply, instead of {mesh}"
+            ),
         }
     }
 }
@@ -340,7 +370,8 @@ impl Inputs {
             (None, _) => mask_in_box(&depth, &camera, bbox),
         };
         let rgb = files.rgb.as_deref();
-        let (model, warning) = colors::read_model(&files.model, files.unit()?, rgb)?;
+        let (model, warning) =
+            colors::read_model(&files.model, files.unit()?, files.read_symmetries()?, rgb)?;
         warnings.extend(warning);
         let color = rgb.map(|path| colors::read_image(path, &of_mask, &files.camera));
         Ok(Read {
@@ -392,6 +423,7 @@ impl Inputs {
         };
         let given = [
             ("--model", Some(&files.model)),
+            ("--symmetries", files.symmetries.as_ref()),
             ("--depth", Some(&files.depth)),
             ("--mask", mask),
             ("--rgb", files.rgb.as_ref()),

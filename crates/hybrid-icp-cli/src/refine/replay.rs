@@ -91,6 +91,7 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
         files: ImageFiles {
             model: header.text("model")?.into(),
             model_unit: header.unit("model_unit")?,
+            symmetries: header.get("symmetries", "a string")?,
             depth: header.text("depth")?.into(),
             depth_scale: Some(header.get("depth_scale", "a number")?),
             rgb: header.get("rgb", "a string")?,

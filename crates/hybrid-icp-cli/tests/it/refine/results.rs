@@ -1,6 +1,9 @@
 //! The JSON of the result, the trace, and where they are written.
 
 use super::*;
+use hicp_sim::Household;
+use hybrid_icp::raster::render_depth_image;
+use serde_json::json;
 
 #[test]
 fn the_result_has_every_key_in_its_type() {
@@ -212,4 +215,53 @@ fn other_poses_that_a_search_finds_are_written() {
         assert!(pose_of(other).translation.z > 0.0);
         last = number("score");
     }
+}
+
+#[test]
+fn poses_of_declared_symmetries_are_no_look_alikes() {
+    let scene = Scene::new();
+    let mesh = Household::Carton.solid().to_mesh().unwrap();
+    let depth = render_depth_image(&mesh, &camera(), &truth());
+    hicp_io::write_ply(scene.path("obj_000007.ply"), &mesh, LengthUnit::Meters).unwrap();
+    hicp_io::write_depth_png(scene.path("depth.png"), &depth, 0.1).unwrap();
+    hicp_io::write_mask_png(scene.path("mask.png"), &Mask::measured(&depth)).unwrap();
+    let scene = scene.with("--model", "obj_000007.ply");
+    let alone = scene.result();
+    assert!(alone["look_alikes"].as_f64().unwrap() > 0.5, "{alone}");
+
+    let half_turn =
+        |x: i32, y: i32, z: i32| json!([x, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0, 0, 0, 0, 1]);
+    let turns = [
+        half_turn(1, -1, -1),
+        half_turn(-1, 1, -1),
+        half_turn(-1, -1, 1),
+    ];
+    let carton = json!({"diameter": 1, "symmetries_discrete": turns});
+    let other = json!({"diameter": 1});
+    scene.write("info.json", json!({"7": carton, "1": other}).to_string());
+    let scene = scene
+        .with("--symmetries", "info.json")
+        .with("--trace", "trace.jsonl");
+    let declared = scene.result();
+    assert_eq!(declared["look_alikes"].as_f64(), Some(0.0), "{declared}");
+    assert!(declared["confidence"].as_f64() > alone["confidence"].as_f64());
+    scene
+        .command("replay trace.jsonl")
+        .exits(0)
+        .prints(&["all equal"]);
+
+    // One object fits a mesh of any name.
+    scene.write("info.json", json!({"1": other}).to_string());
+    scene
+        .run()
+        .fails(&["info.json", "obj_000007.ply", "no object 7"]);
+    std::fs::rename(scene.path("obj_000007.ply"), scene.path("box.ply")).unwrap();
+    let scene = scene.with("--model", "box.ply");
+    scene.write("info.json", json!({"1": carton}).to_string());
+    assert_eq!(scene.result()["look_alikes"].as_f64(), Some(0.0));
+    scene.write("info.json", json!({"7": carton, "1": other}).to_string());
+    scene.run().fails(&[
+        "info.json: found 2 objects",
+        "expected one, or a mesh with an id",
+    ]);
 }
