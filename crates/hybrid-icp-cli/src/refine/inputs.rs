@@ -29,8 +29,8 @@ pub(crate) struct ImageFiles {
     /// m.
     #[arg(long, value_name = "UNIT")]
     pub(crate) model_unit: Option<LengthUnit>,
-    /// The symmetries of the object: a models_info.json of BOP. It has one object, or that of the
-    /// id in the mesh's name, such as obj_000005.ply.
+    /// The symmetries of the object: a models_info.json of BOP. If it describes several objects,
+    /// the name of the mesh states the id, as obj_000005.ply does.
     #[arg(long, value_name = "FILE")]
     pub(crate) symmetries: Option<PathBuf>,
     /// The depth image: PNG, TIFF, NPY, NPZ, EXR, PGM or PFM. 16-bit integers with a depth scale,
