@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::ExperimentError;
 
-/// The path of the threshold α in the pipeline of [`Preset::Hybrid`] and its variations.
-const ALPHA_FIELD: &str = "stage.switcher.alpha";
+/// The path of the threshold α in a switch, and in a repeated one such as [`Preset::Hybrid`].
+const ALPHA_FIELD: &str = "switcher.alpha";
 
 /// A named pipeline: a preset, or a file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

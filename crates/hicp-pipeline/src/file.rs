@@ -65,7 +65,9 @@ impl PipelineFile {
     }
 
     /// Overrides a field: `path=value`, where the path is dotted with list indices from 0, and the
-    /// value is TOML or a bare word.
+    /// value is TOML or a bare word. A first key that the pipeline lacks, but its inner `stage`
+    /// has, is that of the inner stage: `milliseconds` of the preset `color` is
+    /// `stage.milliseconds`.
     ///
     /// # Errors
     ///

@@ -50,6 +50,8 @@ pub(crate) fn list<T>(
 }
 
 /// Applies an override, `path=value`; a last key that is not there is added.
+///
+/// A field that the root lacks, but the table `stage` inside has, is that of the inner stage.
 pub(crate) fn set<'a>(
     root: &mut Spanned<DeValue<'a>>,
     assignment: &'a str,
@@ -65,10 +67,20 @@ pub(crate) fn set<'a>(
         .ok_or_else(|| refuse(format!("{value:?} is more than one TOML value")))?;
     let value = Spanned::new(NOWHERE..NOWHERE, value);
 
-    let keys: Vec<&str> = path.trim().split('.').collect();
+    let mut keys: Vec<&str> = path.trim().split('.').collect();
+    if let Some(table) = root.get_ref().as_table()
+        && !table.contains_key(keys[0])
+        && let Some(stage) = table.get("stage").and_then(|s| s.get_ref().as_table())
+        && stage.contains_key(keys[0])
+    {
+        keys.insert(0, "stage");
+    }
     let mut node = root;
     for (depth, key) in keys.iter().enumerate() {
-        let so_far = keys[..depth].join(".");
+        let so_far = match depth {
+            0 => "the pipeline".to_owned(),
+            _ => format!("{:?}", keys[..depth].join(".")),
+        };
         let last = depth + 1 == keys.len();
         // A part that is given by its bare name becomes a table with a field `type`.
         if last && node.get_ref().is_str() {
@@ -88,20 +100,20 @@ pub(crate) fn set<'a>(
                 }
                 table
                     .get_mut(*key)
-                    .ok_or_else(|| refuse(format!("there is no {key:?} in {so_far:?}")))?
+                    .ok_or_else(|| refuse(format!("{so_far} has no {key:?}")))?
             }
             DeValue::Array(list) => {
                 let count = list.len();
                 let item = key.parse::<usize>().ok().and_then(|i| list.get_mut(i));
                 item.ok_or_else(|| {
                     refuse(format!(
-                        "{so_far:?} is a list of {count}, expected an index below that"
+                        "{so_far} is a list of {count}, expected an index below that"
                     ))
                 })?
             }
             other => {
                 let found = describe(other);
-                return Err(refuse(format!("{so_far:?} is {found}, expected a table")));
+                return Err(refuse(format!("{so_far} is {found}, expected a table")));
             }
         };
     }

@@ -49,7 +49,7 @@ pub use beyond::{
     Search, SearchFrom, Steps, auto, by_color, color, estimate_with, hybrid_visible, local, search,
     search_with,
 };
-pub(crate) use beyond::{far, fit, look_alikes};
+pub(crate) use beyond::{far, fit, fit_of, look_alikes};
 
 use hicp_association::{AllSamples, NearestNeighbor, Projective, VisibleSurface};
 use hicp_icp::{Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat};

@@ -107,6 +107,8 @@ pub struct Refiner<S = BoxedStage> {
     workspace: Workspace,
     score: MeanVsd,
     look_alikes: LookAlikeCount<SampledMve, MeanVsd>,
+    /// Measures the pairs of a pose that no registration evaluated.
+    registration: presets::Fit,
 }
 
 impl Refiner {
@@ -138,6 +140,7 @@ impl<S: Stage> Refiner<S> {
             workspace: Workspace::new(renderer),
             score: MeanVsd::default(),
             look_alikes: presets::look_alikes(),
+            registration: presets::fit_of(1),
         }
     }
 
@@ -261,6 +264,7 @@ impl<S: Stage> Refiner<S> {
         start: Option<(&Isometry3<f64>, f64)>,
         outcome: Outcome,
     ) -> Refinement {
+        let outcome = self.measured(problem, outcome);
         let pose = &outcome.camera_from_object;
         let near = start.zip(problem.model());
         let near = near.is_some_and(|((init, _), model)| is_near(model, init, pose));
@@ -292,6 +296,22 @@ impl<S: Stage> Refiner<S> {
             look_alikes,
             runner_up: self.workspace.alternatives().first().copied(),
         }
+    }
+
+    /// Measures the pairs at the pose of an outcome that no registration evaluated, for example one
+    /// that a search scored and kept.
+    fn measured(&mut self, problem: &Problem<'_>, mut outcome: Outcome) -> Outcome {
+        let nothing = matches!(
+            outcome.termination,
+            Termination::NoPairs | Termination::Unsupported(_)
+        );
+        if outcome.evaluation.is_none() && !nothing {
+            let (pose, observer) = (&outcome.camera_from_object, &mut ());
+            let mut session = Session::new(&mut self.workspace, observer);
+            let at_pose = self.registration.run(problem, pose, &mut session);
+            (outcome.evaluation, outcome.quality) = (at_pose.evaluation, at_pose.quality);
+        }
+        outcome
     }
 
     /// Returns the number of other poses that explain the image as well as `pose`.

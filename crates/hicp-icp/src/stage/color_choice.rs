@@ -1,5 +1,7 @@
 //! The choice by color among poses that depth cannot tell apart.
 
+use std::time::Duration;
+
 use hicp_core::{Isometry3, Model, Observation, Problem, se3};
 use hicp_score::{ColorAgreement, ColorEvidence, SampledColor, Score};
 
@@ -300,6 +302,10 @@ impl<S: Stage, P: Stage, C: Score> Stage for ColorChoice<S, P, C> {
         }
         let distinct = Distinct::of(model);
         self.choose(problem, &distinct, outcome, session)
+    }
+
+    fn time_limit(&self) -> Option<Duration> {
+        self.stage.time_limit()
     }
 
     fn name(&self) -> &'static str {

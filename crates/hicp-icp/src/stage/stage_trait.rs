@@ -1,5 +1,7 @@
 //! The trait of stages: one verb, closed under composition.
 
+use std::time::Duration;
+
 use hicp_core::internal::type_label;
 use hicp_core::{Isometry3, Problem};
 
@@ -83,6 +85,13 @@ pub trait Stage {
         session: &mut Session<'_>,
     ) -> Outcome;
 
+    /// Returns the time limit of a run, if the stage has one.
+    ///
+    /// A search without an initial pose that ends with this stage has the same limit.
+    fn time_limit(&self) -> Option<Duration> {
+        None
+    }
+
     /// Returns the name in traces.
     fn name(&self) -> &'static str {
         type_label::<Self>()
@@ -104,6 +113,10 @@ macro_rules! forward {
                 session: &mut Session<'_>,
             ) -> Outcome {
                 (**self).run(problem, init, session)
+            }
+
+            fn time_limit(&self) -> Option<Duration> {
+                (**self).time_limit()
             }
 
             fn name(&self) -> &'static str {

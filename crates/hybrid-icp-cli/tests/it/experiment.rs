@@ -150,7 +150,7 @@ fn variants_are_names_and_files() {
     of("hybird").refuses(&["did you mean \"hybrid\"?"]);
     folder
         .command("experiment alpha --objects meshes --variants nn-point-to-point")
-        .fails(&["stage"]);
+        .fails(&["switcher.alpha=0.0", "the pipeline has no \"switcher\""]);
     folder
         .command("experiment timing --objects nowhere")
         .fails(&["nowhere"]);

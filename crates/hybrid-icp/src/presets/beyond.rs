@@ -11,7 +11,7 @@ use hicp_association::{
 };
 use hicp_icp::{
     Cascade, ColorChoice, Convergence, Descent, Divergence, Guard, HypothesisSearch, Icp,
-    IterationLimit, LookAlikeCount, Repeat, SearchOptions, Start,
+    IterationLimit, LookAlikeCount, Repeat, SearchOptions, Stage, Start,
 };
 use hicp_metric::{Conditioned, Degeneracy, Photometric, PointToPlane, PointToPoint, Symmetric};
 use hicp_score::{Doubt, MeanVsd, SampledMve};
@@ -159,10 +159,11 @@ pub fn hybrid_visible() -> HybridVisible {
     }
 }
 
-/// Creates the stage that fits the rendered surface and its silhouette to the image.
+/// Creates a stage that fits the rendered surface and its silhouette to the image.
 ///
-/// Rotations that the image does not determine stay as they are.
-pub(crate) fn fit() -> Fit {
+/// Rotations that the image does not determine stay as they are. It ends after some `iterations`,
+/// and with 1 it keeps the pose.
+pub(crate) fn fit_of(iterations: usize) -> Fit {
     Icp {
         selection: (),
         association: (RenderedSurface::default(), Contour::default()),
@@ -172,8 +173,13 @@ pub(crate) fn fit() -> Fit {
             policy: Degeneracy::FreezeRotations,
             threshold: UNDETERMINED,
         },
-        stop: (Convergence::default(), IterationLimit(8)),
+        stop: (Convergence::default(), IterationLimit(iterations)),
     }
+}
+
+/// Creates the fit of the presets, [`fit_of`] eight iterations.
+pub(crate) fn fit() -> Fit {
+    fit_of(8)
 }
 
 /// Creates the fit of doubtful poses.
@@ -212,8 +218,7 @@ pub(crate) fn far() -> Far {
 /// symmetric metric. It ends with four iterations of the first stage.
 #[must_use]
 pub fn local() -> Local {
-    let mut short = fit();
-    short.stop.1 = IterationLimit(4);
+    let short = fit_of(4);
     let steps = SwitchUntilStall {
         switcher: Threshold {
             score: MeanVsd::imperfect_mask(),
@@ -278,11 +283,12 @@ fn search_from<S>(stage: S, options: SearchOptions) -> SearchFrom<S> {
 }
 
 /// A search without an initial pose that ends with `stage`, as in
-/// [`Refiner::estimate`](crate::Refiner::estimate).
+/// [`Refiner::estimate`](crate::Refiner::estimate). It has the time limit of the stage.
 #[must_use]
-pub fn estimate_with<S>(stage: S) -> SearchFrom<S> {
+pub fn estimate_with<S: Stage>(stage: S) -> SearchFrom<S> {
     let options = SearchOptions {
         start: Start::Ignored,
+        time_limit: stage.time_limit(),
         ..SearchOptions::default()
     };
     search_from(stage, options)

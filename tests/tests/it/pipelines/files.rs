@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{perturbed_scene, scene};
+use hybrid_icp::icp::Stage;
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::pipeline::{Accepts, Catalog, PartKind};
 use hybrid_icp::{Preset, Refiner};
@@ -207,13 +208,15 @@ fn overrides_change_nested_fields() {
     file.set("stage.misaligned.association.points=500").unwrap();
     assert!(file.build().is_ok());
     assert_ne!(file, parse());
+    // A field of the inner stage needs no path.
+    let mut color = PipelineFile::parse(Preset::Color.toml(), "color").unwrap();
+    color.set("milliseconds=30").unwrap();
+    let limit = color.build().unwrap().time_limit();
+    assert_eq!(limit, Some(Duration::from_millis(30)));
 
     for (assignment, wanted) in [
         ("times", "expected path=value"),
-        (
-            "stage.nothing.here=1",
-            "there is no \"nothing\" in \"stage\"",
-        ),
+        ("stage.nothing.here=1", "\"stage\" has no \"nothing\""),
         ("stage.aligned.stages.7.metric=x", "a list of 2"),
         (
             "stage.switcher.alpha=0.5\nnonsense=1",

@@ -328,6 +328,27 @@ fn a_search_out_of_time_returns_the_local_pose() {
     );
 }
 
+/// The limit of the refiner's stage is that of an estimate. Without any time, it refines one pose.
+#[test]
+fn an_estimate_has_the_time_limit_of_its_stage() {
+    let scene = scene(Household::Mug, 0.3, &mut rng(0));
+    let estimate = |time_limit| {
+        let options = SearchOptions {
+            time_limit,
+            ..SearchOptions::default()
+        };
+        let mut refiner = Refiner::new(presets::by_color(presets::search_with(options)));
+        refiner.estimate(&scene.model, &scene.observation)
+    };
+    let none = estimate(Some(Duration::ZERO));
+    assert_eq!(none.outcome.verdict, Verdict::Refined);
+    assert_eq!(none.outcome.termination, Termination::Deadline);
+    assert!(none.mve < 0.8, "{}", none.mve);
+    let (most, least) = (estimate(Some(Duration::MAX)), estimate(None));
+    assert_eq!(most, least);
+    assert!(most.mve < 0.1, "{}", most.mve);
+}
+
 /// If no hypothesis can win by the gain, none is ranked.
 #[test]
 fn a_search_without_a_possible_gain_is_not_started() {

@@ -1,5 +1,7 @@
 //! The stage that searches.
 
+use std::time::Duration;
+
 use hicp_core::{Isometry3, Problem, se3};
 use hicp_score::Score;
 
@@ -202,8 +204,8 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
             .flat_map(|local| from.around_both(local))
             .map(Some)
             .chain(from.of(options.rotations, options.hypotheses));
-        for pose in hypotheses {
-            if run.is_over() {
+        for (index, pose) in hypotheses.enumerate() {
+            if run.is_over_after(index) {
                 break;
             }
             if let Some(pose) = pose {
@@ -221,8 +223,8 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         ranked: &[(f64, Isometry3<f64>)],
         (refined, spacing_degrees): (usize, f64),
     ) {
-        for (score, start) in ranked {
-            if run.is_over() {
+        for (index, (score, start)) in ranked.iter().enumerate() {
+            if run.is_over_after(index) {
                 return;
             }
             let pose = run.refine(&mut self.align, start).camera_from_object;
@@ -240,7 +242,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
     fn try_best(&mut self, run: &mut Run<'_, '_>) {
         let mut poses = self.aligned.poses().iter().map(|(_, pose)| *pose);
         if let Some(pose) = poses.find(|pose| run.allows(pose))
-            && !run.is_over()
+            && !run.is_over_after(0)
         {
             let score = run.score(&mut self.score, &pose);
             self.fit(run, Found::explored(score, pose));
@@ -342,7 +344,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         for finalist in 0..FINALISTS.max(refined / 2) {
             let good = |best: Found| best.doubt() <= run.options.good_enough;
             let enough = finalist >= FINALISTS && self.found.cheapest().is_some_and(good);
-            if enough || run.is_over() {
+            if enough || run.is_over_after(finalist) {
                 break;
             }
             let Some(explored) = self.found.next_to_fit(FINAL_GAP) else {
@@ -350,8 +352,8 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
             };
             self.fit(run, explored);
         }
-        for _ in 0..(refined / REFINED).max(1) {
-            if run.is_over() {
+        for finalist in 0..(refined / REFINED).max(1) {
+            if run.is_over_after(finalist) {
                 break;
             }
             let Some(fitted) = self.found.next_to_refine(REFINED_GAP) else {
@@ -461,7 +463,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
             &run.distinct,
             &mut run.session.workspace.alternatives,
         );
-        if bad && run.clock.is_over() {
+        if run.clock.is_over() {
             returned.termination = Termination::Deadline;
             if returned.verdict != Verdict::Refined {
                 returned.verdict = Verdict::KeptInitial(Termination::Deadline);
@@ -471,6 +473,10 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
             iterations: run.iterations,
             ..returned
         }
+    }
+
+    fn time_limit(&self) -> Option<Duration> {
+        self.options.time_limit
     }
 
     fn name(&self) -> &'static str {

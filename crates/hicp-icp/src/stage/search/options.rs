@@ -75,7 +75,7 @@ pub struct SearchOptions {
     ///
     /// Results then depend on the clock; `hypotheses`, `aligned` and `refined` are budgets that do
     /// not. The clock is read between hypotheses, so a run exceeds the limit by at most one of
-    /// them.
+    /// them. Without an initial pose, the best one found by then is still fitted and refined.
     pub time_limit: Option<Duration>,
 }
 

@@ -10,7 +10,7 @@ use crate::observer::DecisionEvent;
 use crate::outcome::{Outcome, Termination};
 use crate::session::Session;
 use crate::stage::search::distinct::Distinct;
-use crate::stage::search::options::SearchOptions;
+use crate::stage::search::options::{SearchOptions, Start};
 use crate::stage::stage_trait::Stage;
 
 /// The inputs of a search, and what it has spent.
@@ -55,6 +55,13 @@ impl Run<'_, '_> {
     /// Returns whether the observer or the time limit ends the search.
     pub(crate) fn is_over(&self) -> bool {
         self.stopped || self.clock.is_over()
+    }
+
+    /// Returns whether a step of the search ends after `n` poses.
+    ///
+    /// Without an initial pose, the time limit lets one pass, so that there is a pose to return.
+    pub(crate) fn is_over_after(&self, n: usize) -> bool {
+        self.is_over() && (self.stopped || n > 0 || self.options.start == Start::Refined)
     }
 }
 
