@@ -25,7 +25,6 @@ def main(dataset: Path, results: Path, refined: Path) -> None:
     images = defaultdict(list)
     for row in rows:
         images[int(row["scene_id"]), int(row["im_id"])].append(row)
-    infos = json.loads((dataset / "models" / "models_info.json").read_text())
     models: dict[int, Model] = {}
     pipelines = [Pipeline(), Pipeline("hybrid")]
 
@@ -41,21 +40,26 @@ def main(dataset: Path, results: Path, refined: Path) -> None:
         depth = DepthImage.from_png(folder / "depth" / f"{image:06}.png", scale)
         K = np.reshape(calibration["cam_K"], (3, 3))
         camera = Camera.from_K(K, (depth.width, depth.height))
+        # The masks of the instances replace those of a detector.
+        instances = defaultdict(list)
+        for index, truth in enumerate(truths):
+            mask = read_mask_png(folder / "mask_visib" / f"{image:06}_{index:06}.png")
+            if mask.any():
+                instances[truth["obj_id"]].append(Observation(depth, mask, camera))
         for row in of_image:
             object_id = int(row["obj_id"])
             if object_id not in models:
-                path = dataset / "models" / f"obj_{object_id:06}.ply"
-                diameter = infos[str(object_id)]["diameter"]
-                models[object_id] = Model.from_file(path, unit="mm", diameter=diameter)
-            # The mask of the first instance of this object replaces the mask of a detector.
-            instance = next(i for i, truth in enumerate(truths) if truth["obj_id"] == object_id)
-            mask = read_mask_png(folder / "mask_visib" / f"{image:06}_{instance:06}.png")
-            observation = Observation(depth, mask, camera)
-
+                models[object_id] = Model.from_bop(dataset / "models", object_id)
+            model = models[object_id]
             rough = np.eye(4)
             rough[:3, :3] = np.reshape(row["R"].split(), (3, 3)).astype(float)
             rough[:3, 3] = np.array(row["t"].split(), float) / 1000
-            refined_by = (p.refine(models[object_id], observation, rough) for p in pipelines)
+            if object_id not in instances:
+                continue
+            # Of several instances, the pose belongs to the one that it explains best.
+            explained = [pipelines[0].judge(model, o, rough).mve for o in instances[object_id]]
+            observation = instances[object_id][int(np.argmin(explained))]
+            refined_by = (p.refine(model, observation, rough) for p in pipelines)
             best = min(refined_by, key=lambda result: result.mve)
             if best.mve < best.mve_initial:
                 improved += 1
