@@ -40,6 +40,7 @@ struct Line {
     upper: f64,
     estimates: usize,
     share_correct: Option<f64>,
+    share_correct_mssd: Option<f64>,
     mean_score: Option<f64>,
 }
 
@@ -60,17 +61,19 @@ impl Calibration {
         let (judged, by_mssd): (Vec<LabeledScore>, Vec<LabeledScore>) =
             judged.map(|[adi, mssd]| (adi, mssd)).unzip();
         let bins = reliability(&judged, BINS).into_iter();
+        let bins = bins.zip(reliability(&by_mssd, BINS));
         Self {
             estimates: judged.len(),
             correct: judged.iter().filter(|j| j.correct).count(),
             roc_area: roc_area(&judged),
             reliability: bins
-                .filter(|bin| bin.count > 0)
-                .map(|bin| Line {
+                .filter(|(bin, _)| bin.count > 0)
+                .map(|(bin, by_mssd)| Line {
                     lower: bin.lower,
                     upper: bin.upper,
                     estimates: bin.count,
                     share_correct: bin.share_correct(),
+                    share_correct_mssd: by_mssd.share_correct(),
                     mean_score: bin.mean_score(),
                 })
                 .collect(),
@@ -86,25 +89,32 @@ impl Calibration {
             Some(_) => number(area),
             None => "undefined, because all are correct or all are wrong".to_owned(),
         };
-        let heads = ["score", "estimates", "share correct", "mean score"];
+        let heads = [
+            "score",
+            "estimates",
+            "mean score",
+            "MSSD < 0.1 d",
+            "ADI < 0.1 d",
+        ];
         let mut rows = vec![heads.map(str::to_owned)];
         rows.extend(self.reliability.iter().map(|line| {
             [
                 format!("{:.1}-{:.1}", line.lower, line.upper),
                 line.estimates.to_string(),
-                number(line.share_correct),
                 number(line.mean_score),
+                number(line.share_correct_mssd),
+                number(line.share_correct),
             ]
         }));
         format!(
-            "score against ADI < 0.1 d: {} estimates, {} correct, ROC area {}\n{}\n\
-             score against MSSD < 0.1 d: {} correct, ROC area {}",
+            "score against MSSD < 0.1 d: {} estimates, {} correct, ROC area {}\n\
+             score against ADI < 0.1 d: {} correct, ROC area {}\n{}",
             self.estimates,
+            self.correct_mssd,
+            area(self.roc_area_mssd),
             self.correct,
             area(self.roc_area),
             table(&rows, 0),
-            self.correct_mssd,
-            area(self.roc_area_mssd),
         )
     }
 }
