@@ -183,13 +183,17 @@ impl<'a> BopImage<'a> {
     ///
     /// # Errors
     ///
-    /// [`RowStatus::NoMask`] without both, [`RowStatus::Damaged`] if the mask has another size than
-    /// the depth image.
+    /// [`RowStatus::NoMask`] without both, [`RowStatus::NothingMeasured`] if no depth was measured
+    /// inside, [`RowStatus::Damaged`] if the mask has another size than the depth image.
     pub fn observe_detection(&mut self, detection: &Detection) -> Result<Observation, RowStatus> {
         let source = Source::of(detection).ok_or(RowStatus::NoMask)?;
         let mask = source.read(&self.image);
         let observation = mask.and_then(|mask| self.image.observe(mask));
-        observation.map_err(|fault| enter(&mut self.faults, fault))
+        let observation = observation.map_err(|fault| enter(&mut self.faults, fault))?;
+        match observation.n_measured() {
+            0 => Err(RowStatus::NothingMeasured),
+            _ => Ok(observation),
+        }
     }
 
     /// Reads a mask that is not held. Releases all other masks if the memory would be exceeded.

@@ -95,6 +95,29 @@ pub(crate) fn wrong_diameters(models: &Models, info: &Path) -> BTreeMap<u32, Str
     wrong.collect()
 }
 
+/// Returns a message about the objects that `models_info.json` does not describe, at path `info`.
+///
+/// Their symmetries are not declared then, so that equivalent poses count as wrong.
+pub(crate) fn undescribed(models: &Models, info: &Path) -> Option<String> {
+    let absent = hicp_io::is_absent(info);
+    let known = match absent {
+        true => BTreeMap::new(),
+        false => limits().read_models_info(info).ok()?,
+    };
+    let objects = models.by_id.keys().copied();
+    let unknown: Vec<u32> = objects.filter(|id| !known.contains_key(id)).collect();
+    let fault = match absent {
+        true => "is missing".to_owned(),
+        false => format!("does not describe object {}", ids(&unknown)),
+    };
+    (!unknown.is_empty()).then(|| {
+        format!(
+            "{} {fault}: no symmetries are declared, and diameters are those of the meshes",
+            info.display()
+        )
+    })
+}
+
 /// Returns a message about the objects without a model in a folder.
 ///
 /// It names the path at which the first model was expected.

@@ -43,8 +43,8 @@ pub(crate) struct Arguments {
     /// The pipelines: names (`hybrid-icp pipelines` lists them) or TOML files.
     #[arg(long, value_name = "A,B,…", value_delimiter = ',', required = true)]
     pipelines: Vec<Source>,
-    /// Override a field of every pipeline, such as milliseconds=30 of those that search; may be
-    /// given several times.
+    /// Override a field, which every pipeline must have, such as milliseconds=30 of auto and color;
+    /// may be given several times.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     overrides: Vec<String>,
     /// The folder to write to, which is created if it does not exist.
@@ -97,9 +97,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let settings = arguments.masks.label() + &overrides.collect::<String>();
     let mut comparison = Comparison::new(&arguments.dataset, &arguments.results, &settings);
     let initial = arguments.evaluate(INITIAL, &arguments.results)?;
-    // The targets are the same for all.
-    let left_out = initial.left_out();
     comparison.add(INITIAL, initial, None);
+    let mut journals = Vec::new();
     for (name, pipeline) in pipelines {
         let output = out.join(format!("{name}.csv"));
         let job = RefineJob {
@@ -116,6 +115,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             rescore: Rescore::Keep,
             hypotheses: 1,
             resume: true,
+            keeps_journal: true,
             resumed_by: "the same command",
             // Nobody expects the poses of the baseline to be right.
             distrusts: name != BASELINE,
@@ -123,6 +123,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         };
         let seconds = job.run(limits().read_results(&arguments.results)?)?;
         comparison.add(&name, arguments.evaluate(&name, &output)?, seconds);
+        journals.extend(journal_of(&output));
     }
     let results = |name: &str| out.join(format!("{name}.csv"));
     let worst = comparison.worst();
@@ -133,9 +134,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         hicp_io::write_atomically(path, |writer| writer.write_all(text.as_bytes()))?;
     }
     write_json(&json, &comparison)?;
+    // The comparison is done: nothing is left to continue.
+    for journal in journals {
+        std::fs::remove_file(&journal).with_context(|| journal.display().to_string())?;
+    }
     let Table { head, rows, .. } = comparison.overall();
     let lines: Vec<_> = std::iter::once(head).chain(rows).collect();
-    let left_out = left_out.map_or_else(String::new, |text| format!("\n{text}"));
+    let left_out = comparison.left_out.iter();
+    let left_out: String = left_out.map(|text| format!("\n{text}")).collect();
     say(format_args!(
         "{}{left_out}\n\n{} has the tables by object",
         table(&lines, 1),

@@ -20,6 +20,8 @@ pub(super) struct Comparison {
     split: String,
     init: String,
     entries: Vec<Entry>,
+    /// Says how many targets could not be evaluated, which are the same for all.
+    pub(super) left_out: Option<String>,
     /// The names of the compared files, without their folders.
     #[serde(skip)]
     subject: String,
@@ -85,6 +87,7 @@ impl Comparison {
             split: dataset.split.clone(),
             init: init.display().to_string(),
             entries: Vec::new(),
+            left_out: None,
             subject: format!(
                 "{} in {}, split {}{settings}",
                 file_name(init),
@@ -100,6 +103,7 @@ impl Comparison {
     /// Ratios and differences are unknown until the first pipeline is added.
     pub(super) fn add(&mut self, name: &str, evaluation: eval::Report, seconds: Option<f64>) {
         let initial = self.entries.first();
+        self.left_out = evaluation.left_out();
         self.entries.push(Entry {
             name: name.to_owned(),
             changes: initial.map(|initial| changes(&initial.adi_m, &evaluation.adi_m)),
@@ -204,7 +208,9 @@ impl Comparison {
     /// Names the compared files.
     fn subject(&self) -> String {
         let targets = self.entries.first().map_or(0, |first| first.all.targets);
-        format!("{}: {targets} targets", self.subject)
+        let left_out = self.left_out.iter();
+        let left_out: String = left_out.map(|text| format!("; {text}")).collect();
+        format!("{}: {targets} targets{left_out}", self.subject)
     }
 
     /// Returns the tables by object, with their headings.

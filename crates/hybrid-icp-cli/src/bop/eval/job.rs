@@ -87,8 +87,8 @@ impl EvalJob {
         let scenes = Scenes::new(&dataset, split, pool.current_num_threads() + 1);
         let models_dir = dataset.eval_models_dir()?;
         let models = pool.install(|| models::read(&models_dir, &objects))?;
-        let diameters =
-            pool.install(|| models::wrong_diameters(&models, &models_dir.join("models_info.json")));
+        let info = models_dir.join("models_info.json");
+        let diameters = pool.install(|| models::wrong_diameters(&models, &info));
         let objects = EvaluatedObject::of_models(&models, self.symmetric.as_deref());
         let judge = Judge::new(objects, &scenes, &rows, 1e-3 * self.delta_mm);
         let progress = progress_bar(wanted.len(), "images");
@@ -109,6 +109,7 @@ impl EvalJob {
         });
 
         let mut warnings: Vec<String> = diameters.into_values().collect();
+        warnings.extend(models::undescribed(&models, &info));
         warnings.extend(self.misfits(&rows, &wanted));
         let missing = models::missing(&models, &models_dir);
         warnings.extend(missing.map(|text| format!("{text}; its targets are left out")));

@@ -107,6 +107,7 @@ impl JobOptions {
             },
             hypotheses: self.hypotheses,
             resume: self.resume,
+            keeps_journal: false,
             resumed_by: "--resume",
             distrusts: true,
             listed_by: Some("--rows"),
@@ -144,6 +145,8 @@ pub(crate) struct RefineJob<'a> {
     pub(crate) hypotheses: usize,
     /// If `true`, continues an existing journal.
     pub(crate) resume: bool,
+    /// If `true`, leaves the journal of a run that is done, so that its results can be read again.
+    pub(crate) keeps_journal: bool,
     /// The option that continues an interrupted run, for messages.
     pub(crate) resumed_by: &'static str,
     /// If `true`, warns of poses that should not be trusted.

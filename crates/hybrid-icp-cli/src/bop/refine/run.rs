@@ -88,14 +88,20 @@ impl RefineJob<'_> {
         let n_rows = rows.len();
         rows.extend(others);
         hicp_io::bop::write_results(self.output, &rows)?;
-        journal.map_or(Ok(()), Journal::remove)?;
+        // Somebody may repair what is damaged.
+        let damaged = |result: &FrameResult| !result.faults.is_empty();
+        let damaged = results.iter().any(damaged) || !shared.models.broken.is_empty();
+        if let Some(journal) = journal.filter(|_| damaged || !self.keeps_journal) {
+            journal.remove()?;
+        }
 
         let distrust = Distrust::of(&results);
         let mut text = format!(
-            "{}: {} of {} in {:.1} s on {}",
+            "{}: {} of {} by {} in {:.1} s on {}",
             self.output.display(),
             counted(n_rows, "row"),
             counted(results.len(), "frame"),
+            self.pipeline.name,
             start.elapsed().as_secs_f64(),
             counted(pool.current_num_threads(), "thread"),
         );

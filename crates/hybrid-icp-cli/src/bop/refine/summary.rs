@@ -32,6 +32,7 @@ pub(super) fn summary(
     for (status, count) in &counts {
         let status_text = match (job.estimates(), status) {
             (true, RowStatus::Refined) => "estimated".to_owned(),
+            (true, RowStatus::NothingMeasured) => "left out: nothing measured inside".to_owned(),
             (true, _) => status.to_string().replacen("kept", "left out", 1),
             _ => status.to_string(),
         };

@@ -17,6 +17,8 @@ const IDS_SHOWN: usize = 5;
 
 /// Warns of models that seem to have another unit and of diameters that differ from the meshes.
 pub(super) fn about_models(models: &Models, folder: &ModelFolder) {
+    let undescribed = models::undescribed(models, folder.info_path());
+    undescribed.into_iter().for_each(warn);
     let diameters = models::wrong_diameters(models, folder.info_path());
     for (obj_id, model) in &models.by_id {
         let diameter = diameters.get(obj_id);

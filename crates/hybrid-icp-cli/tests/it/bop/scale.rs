@@ -116,6 +116,7 @@ fn images_of_damaged_journal_lines_are_refined_again() {
 #[test]
 fn a_run_continues_only_with_the_files_that_it_started_with() {
     let world = World::new();
+    world.remove("models/models_info.json");
     world.refined(&grouped_for_signals(&world), "--no-time");
     let expected = world.bytes(OUTPUT);
     let held = killed(&world, "--no-time");

@@ -54,6 +54,31 @@ fn a_correct_dataset_gives_no_warning() {
     assert_eq!(run.exits(0).err, "");
 }
 
+/// Without declared symmetries, equivalent poses count as wrong.
+#[test]
+fn objects_that_models_info_does_not_describe_are_named_once() {
+    let world = World::new();
+    for (content, fault) in [
+        (
+            Some(r#"{"1": {"diameter": 197.3}}"#),
+            "does not describe object 2",
+        ),
+        (None, "is missing"),
+    ] {
+        world.remove("models/models_info.json");
+        if let Some(content) = content {
+            world.write("models/models_info.json", content);
+        }
+        let (run, _) = world.refine(&world.rows(), "");
+        let eval = world.command("bop eval --dataset . --results out.csv");
+        let [refine, eval] = [run, eval].map(|run| run.exits(0).err);
+        let wanted = format!(
+            "warning: ./models/models_info.json {fault}: no symmetries are declared, and diameters are those of the meshes\n"
+        );
+        assert_eq!([refine, eval], [wanted.clone(), wanted]);
+    }
+}
+
 /// Every scene has its own files, so one wrong scene of many must be reported.
 #[test]
 fn depth_at_ten_times_its_scale_is_reported_once_per_object() {
@@ -179,20 +204,11 @@ fn results_on_a_wall_are_warned_of() {
     assert!(warned > 0);
 }
 
-/// Writes the diameters of the models in millimeters, that of the car times a factor.
-fn state_diameters(world: &World, factor: f64) {
-    let info = json!({
-        "1": {"diameter": factor * world.diameter_mm(CAR)},
-        "2": {"diameter": world.diameter_mm(HAMMER)},
-    });
-    world.write("models/models_info.json", info.to_string());
-}
-
 #[test]
 fn a_stated_diameter_that_differs_from_the_mesh_is_reported_once() {
     let world = World::new();
     let told = |factor: f64| -> Vec<String> {
-        state_diameters(&world, factor);
+        world.state_diameters(factor);
         let (run, _) = world.refine(&world.rows(), "");
         let run = run.exits(0);
         about_inputs(&run).iter().map(|l| (*l).to_owned()).collect()
@@ -233,6 +249,7 @@ fn a_model_in_meters_is_reported_before_a_pose_depends_on_it() {
     let world = World::new();
     let path = world.path("models/obj_000001.ply");
     hicp_io::write_ply(&path, &car(), LengthUnit::Meters).unwrap();
+    world.state_diameters(1.0);
     let (run, _) = world.refine(&world.rows(), "");
     let run = run.exits(0);
     let told = about_inputs(&run);
@@ -264,6 +281,7 @@ fn a_model_of_a_tenth_of_its_size_is_detected_by_the_masks() {
     let small = TriMesh::new(vertices.collect(), small.triangles().to_vec()).unwrap();
     let path = world.path("models/obj_000001.ply");
     hicp_io::write_ply(&path, &small, LengthUnit::Millimeters).unwrap();
+    world.state_diameters(1.0);
     let (run, _) = world.refine(&world.rows(), "");
     let run = run.exits(0);
     let told = about_inputs(&run);

@@ -46,6 +46,7 @@ impl World {
             let path = world.path(format!("models/obj_{id:06}.ply"));
             hicp_io::write_ply(path, mesh, LengthUnit::Millimeters).unwrap();
         }
+        world.state_diameters(1.0);
         for scene in [3, 12] {
             let mut cameras = serde_json::Map::new();
             let mut ground_truth = serde_json::Map::new();
@@ -103,6 +104,15 @@ impl World {
     pub(crate) fn diameter_mm(&self, obj_id: u32) -> f64 {
         let path = self.path(format!("models/obj_{obj_id:06}.ply"));
         1e3 * Model::new(read_mesh(path, LengthUnit::Millimeters).unwrap()).diameter()
+    }
+
+    /// Writes the diameters of the models, that of the car times a factor.
+    pub(crate) fn state_diameters(&self, factor: f64) {
+        let info = json!({
+            "1": {"diameter": factor * self.diameter_mm(CAR)},
+            "2": {"diameter": self.diameter_mm(HAMMER)},
+        });
+        self.write("models/models_info.json", info.to_string());
     }
 
     /// Returns the visible masks as detections, in the order of the ground truth.

@@ -181,21 +181,28 @@ fn interrupted_runs_save_finished_work_and_name_the_option_to_continue() {
     experiment(15).interrupt(&["-INT", "-TERM"]);
 }
 
-/// `bop compare` has no `--resume`: the same command continues.
+/// `bop compare` has no `--resume`: the same command continues, and finished pipelines are not
+/// repeated.
 #[test]
 fn an_interrupted_comparison_continues_with_the_same_command() {
     let refine = bop_refine(grouped_for_signals);
-    let words = "bop compare --dataset . --init in.csv --pipelines hybrid --out out --threads 1";
+    let words =
+        "bop compare --dataset . --init in.csv --pipelines hybrid,local --out out --threads 1";
     let job = Job {
         command: words.to_owned(),
-        kept: "hybrid.csv.journal",
+        kept: "local.csv.journal",
         ..refine
     };
     let (_, told) = job.interrupted("-INT");
     assert_contains(&told, &["continue with the same command"]);
+    let first = job.folder.bytes("out/hybrid.csv");
     let run = job.folder.command(&job.command).exits(0);
-    run.prints(&["frames from the journal"]);
-    assert!(!job.kept().exists());
+    let resumed = run.out.matches("frames from the journal").count();
+    assert_eq!(resumed, 3, "{}", run.out);
+    // It has the times of the first run.
+    assert_eq!(job.folder.bytes("out/hybrid.csv"), first);
+    let mut names = job.folder.names("out").into_iter();
+    assert!(!names.any(|name| name.ends_with(".journal")));
 }
 
 /// Runs the program in a shell after another command.

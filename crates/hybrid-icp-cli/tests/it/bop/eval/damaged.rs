@@ -7,8 +7,7 @@ use super::*;
 fn a_stated_diameter_that_differs_from_the_mesh_is_warned_of() {
     let world = dataset();
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
-    let info = json!({"1": {"diameter": 1500.0}}).to_string();
-    world.write("models/models_info.json", info);
+    world.state_diameters(1500.0 / world.diameter_mm(CAR));
     let run = eval(&world, "").warns(&[
         "models_info.json: object 1: the stated diameter is 1.5000 m, but that of the mesh is 0.1",
         "check both, because poses, the MVE and recalls depend on it",
