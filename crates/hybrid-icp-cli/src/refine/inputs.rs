@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 use clap::error::ErrorKind;
 use clap::{ArgGroup, Args};
+use hicp_io::bop::ModelInfo;
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
 use hybrid_icp::core::{
-    ColorImage, DepthImage, Mask, Model, Observation, PinholeCamera, Symmetries,
+    ColorImage, DepthImage, Mask, Model, ModelConfig, Observation, PinholeCamera,
 };
-use hybrid_icp::{box_overlaps, mask_in_box, warning_of_box};
+use hybrid_icp::{box_overlaps, mask_in_box, warning_of_box, warning_of_diameter};
 
 use super::colors;
 use crate::limits::limits;
@@ -87,10 +88,10 @@ impl ImageFiles {
         }
     }
 
-    /// Reads the declared symmetries of the mesh.
-    fn read_symmetries(&self) -> anyhow::Result<Symmetries> {
+    /// Reads the declared symmetries of the mesh, and the diameter beside them.
+    fn read_symmetries(&self) -> anyhow::Result<Option<ModelInfo>> {
         let Some(path) = &self.symmetries else {
-            return Ok(Symmetries::default());
+            return Ok(None);
         };
         let mut objects = limits().read_models_info(path)?;
         let name = self.model.file_stem().and_then(OsStr::to_str);
@@ -98,12 +99,11 @@ impl ImageFiles {
         let (file, mesh, count) = (path.display(), self.model.display(), objects.len());
         if let Some(id) = id {
             let object = objects.remove(&id);
-            return object
-                .map(|object| object.symmetries)
-                .with_context(|| format!("{file}: no object {id}, expected that of {mesh}"));
+            let absent = || format!("{file}: no object {id}, expected that of {mesh}");
+            return object.map(Some).with_context(absent);
         }
         match objects.pop_first() {
-            Some((_, object)) if objects.is_empty() => Ok(object.symmetries),
+            Some((_, object)) if objects.is_empty() => Ok(Some(object)),
             _ => bail!(
                 "{file}: found {count} objects, expected one, or a mesh with an id in its name, such as obj_000005.ply, instead of {mesh}"
             ),
@@ -370,9 +370,19 @@ impl Inputs {
             (None, _) => mask_in_box(&depth, &camera, bbox),
         };
         let rgb = files.rgb.as_deref();
-        let (model, warning) =
-            colors::read_model(&files.model, files.unit()?, files.read_symmetries()?, rgb)?;
+        let info = files.read_symmetries()?;
+        let stated = ModelConfig {
+            diameter: info.as_ref().map(|info| info.diameter_m),
+            ..ModelConfig::default()
+        };
+        let symmetries = info.map(|info| info.symmetries).unwrap_or_default();
+        let (model, warning) = colors::read_model(&files.model, files.unit()?, symmetries, rgb)?;
         warnings.extend(warning);
+        if let Some(path) = &files.symmetries {
+            let warning = warning_of_diameter(&Model::with_config(model.mesh().clone(), stated));
+            let text = |warning| format!("{}: {warning}: check both units", path.display());
+            warnings.extend(warning.map(text));
+        }
         let color = rgb.map(|path| colors::read_image(path, &of_mask, &files.camera));
         Ok(Read {
             mask,

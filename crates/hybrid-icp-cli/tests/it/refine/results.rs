@@ -245,6 +245,12 @@ fn poses_of_declared_symmetries_are_no_look_alikes() {
     let declared = scene.result();
     assert_eq!(declared["look_alikes"].as_f64(), Some(0.0), "{declared}");
     assert!(declared["confidence"].as_f64() > alone["confidence"].as_f64());
+    // The diameter of 1 mm is that of no carton.
+    let warning = declared["warnings"][0].as_str().unwrap();
+    assert!(
+        warning.contains("info.json: the stated diameter is 0.0010 m"),
+        "{warning}"
+    );
     scene
         .command("replay trace.jsonl")
         .exits(0)
