@@ -7,14 +7,15 @@ use crate::internal::small::inverse3;
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion};
 
-/// Largest deviation from orthogonality and from determinant 1 that counts as rounding.
-pub const ROTATION_TOLERANCE: f64 = 1e-3;
+/// Largest deviation from orthogonality and from determinant 1 that counts as rounding: entries
+/// with three digits after the point deviate by at most 1.8·10⁻³.
+pub const ROTATION_TOLERANCE: f64 = 2e-3;
 
 /// Returns the rotation nearest to a matrix that is a rotation up to rounding.
 ///
-/// Matrices read from files have five to nine digits and are orthogonal only to that precision. The
-/// nearest rotation is the polar factor R (RᵀR)^−½. It is computed by Newton's iteration R ← (R +
-/// R⁻ᵀ)/2, because nalgebra's `from_matrix` can return the identity near half turns.
+/// Matrices read from files have three to nine digits and are orthogonal only to that precision.
+/// The nearest rotation is the polar factor R (RᵀR)^−½. It is computed by Newton's iteration
+/// R ← (R + R⁻ᵀ)/2, because nalgebra's `from_matrix` can return the identity near half turns.
 ///
 /// # Errors
 ///
