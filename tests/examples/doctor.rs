@@ -42,7 +42,7 @@ struct Inputs {
 type Injected = (&'static str, &'static str, fn(Inputs) -> Inputs);
 
 #[rustfmt::skip]
-const FAULTS: [Injected; 45] = [
+const FAULTS: [Injected; 48] = [
     ("mesh: mm read as m", "the mesh is 1000 times too large", |i| i.mesh(1e3, false)),
     ("mesh: m read as mm", "the mesh is 1000 times too small", |i| i.mesh(1e-3, false)),
     ("mesh: cm read as m", "the mesh is 100 times too large", |i| i.mesh(1e2, false)),
@@ -84,6 +84,9 @@ const FAULTS: [Injected; 45] = [
         i.intrinsics(|[fx, fy, cx, cy]| [cx, cy, fx, fy])
     }),
     ("camera: cx and cy swapped", INTRINSICS, |i| i.intrinsics(|[fx, fy, cx, cy]| [fx, fy, cy, cx])),
+    ("camera: focal length ×0.8", FOCAL, |i| i.intrinsics(|[fx, fy, cx, cy]| [0.8 * fx, 0.8 * fy, cx, cy])),
+    ("camera: focal length ×1.15", FOCAL, |i| i.intrinsics(|[fx, fy, cx, cy]| [1.15 * fx, 1.15 * fy, cx, cy])),
+    ("camera: focal length ×1.5", FOCAL, |i| i.intrinsics(|[fx, fy, cx, cy]| [1.5 * fx, 1.5 * fy, cx, cy])),
     ("pose: transposed", "the rotation of the pose is transposed", |i| {
         i.poses(|pose| Isometry3::from_parts(pose.translation, pose.rotation.inverse()))
     }),
@@ -127,6 +130,7 @@ const FAULTS: [Injected; 45] = [
     }),
 ];
 const RAY: &str = "depth: along the ray";
+const FOCAL: &str = "the focal length of the camera is ";
 const INTRINSICS: &str = "the intrinsics belong to images of another resolution";
 
 impl Inputs {
@@ -240,10 +244,11 @@ impl Inputs {
 }
 
 /// Returns whether a fault is named, with the right numbers.
-fn is_named(found: &Fault, expected: &str, clean: &PinholeCamera) -> bool {
+fn is_named(found: &Fault, expected: &str, [clean, faulty]: [&PinholeCamera; 2]) -> bool {
     let near = |a: f64, b: f64| (a / b - 1.0).abs() < 0.01;
     let is_right = match found {
         Fault::Intrinsics { fx, fy, .. } => near(*fx, clean.fx()) && near(*fy, clean.fy()),
+        Fault::FocalLength { factor } => (factor * faulty.fx() / clean.fx()).ln().abs() < 0.1,
         Fault::MaskTooLarge { .. } | Fault::PlaneInMask { .. } => true,
         _ => !expected.is_empty(),
     };
@@ -311,7 +316,9 @@ fn main() -> Result<(), Failure> {
             }
             let diagnosis = diagnose(&faulty);
             match diagnosis.fault() {
-                Some(found) if is_named(found, expected, &inputs.camera) => row.named += 1,
+                Some(found) if is_named(found, expected, [&inputs.camera, &faulty.camera]) => {
+                    row.named += 1
+                }
                 found => {
                     row.missed += 1;
                     let found = found.map_or("nothing".into(), Fault::to_string);

@@ -60,6 +60,11 @@ pub enum Fault {
         /// Row of the principal point.
         cy: f64,
     },
+    /// The focal lengths are those of another camera.
+    FocalLength {
+        /// The number by which both must be multiplied, to a few percent.
+        factor: f64,
+    },
     /// The depth image has distances along the viewing ray.
     RayDistance,
     /// The depth image has large values for near surfaces: a constant minus the depth.
@@ -172,6 +177,11 @@ impl Fault {
                     "the intrinsics belong to images of another resolution, or are in another order"
                         .to_owned();
                 (fault, format!("use fx {fx}, fy {fy}, cx {cx}, cy {cy}"))
+            }
+            Self::FocalLength { factor } => {
+                let (fault, _) = scale("the focal length of the camera", factor);
+                let fix = "use the intrinsics of the camera that took the depth image".to_owned();
+                (format!("{fault}, about"), fix)
             }
             Self::RayDistance => texts(
                 "the depth image has distances along the ray instead of depths",

@@ -10,7 +10,9 @@ use super::images::{
     ray_distance,
 };
 use super::inputs::Inputs;
-use super::scales::{DECIMAL, depth_scale, intrinsics, mesh_scale, translation_scale};
+use super::scales::{
+    DECIMAL, depth_scale, focal_length, intrinsics, mesh_scale, translation_scale,
+};
 
 /// The possible faults of some inputs, each with the corrected inputs.
 type Hypothesis = for<'a> fn(&Inputs<'a>) -> Vec<(Fault, Inputs<'a>)>;
@@ -19,13 +21,14 @@ type Hypothesis = for<'a> fn(&Inputs<'a>) -> Vec<(Fault, Inputs<'a>)>;
 const ELSEWHERE: f64 = 0.25;
 
 /// All hypotheses.
-pub(super) const ALL: [Hypothesis; 13] = [
+pub(super) const ALL: [Hypothesis; 14] = [
     mesh_scale,
     depth_scale,
     translation_scale,
     pose_convention,
     origin,
     intrinsics,
+    focal_length,
     mask_inverted,
     ray_distance,
     mirrored,
@@ -48,6 +51,7 @@ pub(super) fn handicap(fault: &Fault) -> f64 {
         // The mask of another object at another place is also explained a little.
         Fault::Origin { .. } => 0.2,
         Fault::MeshScale { factor } if !DECIMAL.contains(factor) => 0.05,
+        Fault::FocalLength { .. } => 0.05,
         Fault::Disparity { product } if product.log10().fract() != 0.0 => 0.1,
         _ => 0.0,
     }

@@ -91,6 +91,20 @@ impl Inputs<'_> {
         render_depth_image(self.model.mesh(), &self.camera, &self.init)
     }
 
+    /// Returns the share of the pixels of model or mask that both cover, at the initial pose.
+    pub(super) fn overlap(&self) -> f64 {
+        let rendered = self.rendered();
+        let pixels = rendered.pixels().iter().zip(self.mask.pixels());
+        let (both, either) = pixels.fold((0_u32, 0_u32), |(both, either), (z, set)| {
+            let seen = *z > 0.0;
+            (
+                both + u32::from(seen && *set),
+                either + u32::from(seen || *set),
+            )
+        });
+        f64::from(both) / f64::from(either.max(1))
+    }
+
     /// Returns the point with the median coordinates of a depth image, in the camera frame, or
     /// `None` without a measurement.
     ///

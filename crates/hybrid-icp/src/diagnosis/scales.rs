@@ -21,6 +21,9 @@ const SIZES: [[f64; 2]; 24] = [
 ];
 /// Factors between images of the same shape.
 const FACTORS: [f64; 8] = [0.25, 1.0 / 3.0, 0.5, 0.75, 1.5, 2.0, 3.0, 4.0];
+/// Factors of focal lengths: powers of a number, from a half to two.
+const STEP: f64 = 1.05;
+const STEPS: i32 = 14;
 /// Mantissas of usual depth scales.
 const MANTISSAS: [f64; 6] = [1.0, 2.0, 2.5, 4.0, 5.0, 8.0];
 
@@ -77,6 +80,33 @@ pub(super) fn translation_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'
         (Fault::TranslationScale { factor }, inputs)
     };
     factor.map(scaled).into_iter().collect()
+}
+
+/// With the right focal lengths, the model covers the mask best.
+pub(super) fn focal_length<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+    let old = inputs.camera;
+    let scaled = |factor: f64| {
+        let (fx, fy) = (old.fx() * factor, old.fy() * factor);
+        let size = (old.width(), old.height());
+        let camera = PinholeCamera::new(fx, fy, old.cx(), old.cy(), size.0, size.1).ok()?;
+        let inputs = Inputs {
+            camera,
+            ..inputs.clone()
+        };
+        Some((inputs.overlap(), (Fault::FocalLength { factor }, inputs)))
+    };
+    let factors = (-STEPS..=STEPS).map(|step| STEP.powi(step));
+    let best = factors
+        .filter_map(scaled)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let other = |(fault, _): &(Fault, _)| match fault {
+        Fault::FocalLength { factor } => factor.ln().abs() > 1.5 * STEP.ln(),
+        _ => false,
+    };
+    best.map(|(_, found)| found)
+        .filter(other)
+        .into_iter()
+        .collect()
 }
 
 /// The principal point is near the middle of the image that the intrinsics belong to.
