@@ -50,6 +50,12 @@ impl Workspace {
         self.renders.view(model, camera, camera_from_object)
     }
 
+    /// The pairs of the last iteration of the last [`Icp`](crate::Icp).
+    #[must_use]
+    pub fn pairs(&self) -> &Correspondences {
+        &self.pairs
+    }
+
     /// The distinct other poses that the last search found, best first.
     ///
     /// A [`HypothesisSearch`](crate::HypothesisSearch) writes them. Other stages leave them as they

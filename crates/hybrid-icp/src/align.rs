@@ -6,16 +6,20 @@ use hicp_association::{
     AllSamples, MaxDistance, NearestNeighbor, SearchIndex, Stride, estimate_normals,
     voxel_downsample,
 };
+use hicp_core::internal::small::eigen3;
 use hicp_core::internal::{bounds, coordinate_step, named};
 use hicp_core::{
-    Cloud, Isometry3, Matrix6, Point3, Problem, Source, Surfel, Target, UnitVector3, UnknownName,
-    Vector3,
+    Cloud, Correspondences, Isometry3, Matrix3, Matrix6, Point3, Problem, Source, Surfel, Target,
+    UnitVector3, UnknownName, Vector3,
 };
 use hicp_icp::{
-    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, SmallMotion, Stage, Termination,
-    Workspace,
+    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Quality, Session, SmallMotion, Stage,
+    Termination, Workspace,
 };
-use hicp_metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint};
+use hicp_metric::{
+    Conditioned, Degeneracy, Generalized, Minimize, NormalEquations, Observability, PointToPlane,
+    PointToPoint,
+};
 use hicp_raster::Rasterizer;
 use thiserror::Error;
 
@@ -29,12 +33,18 @@ const LITTLE_OVERLAP: f64 = 0.3;
 /// determines it.
 const UNDETERMINED: f64 = 0.01;
 
+/// The same for a rotation that stays as it is, as in [`presets::local`](crate::presets::local).
+const FROZEN: f64 = 0.005;
+
 /// Ratio of the extents of two clouds without overlap from which a warning follows: less than that
 /// of meters to centimeters.
 const OTHER_UNIT: f64 = 30.0;
 
 /// Largest distance between adjacent coordinates that never matters, also in a cloud of one point.
 const FINE_METERS: f64 = 1e-6;
+
+/// Squared share of a rotation in the open directions from which a warning names it.
+const ROTATION: f64 = 0.1;
 
 /// Gates of a registration without a stated one, as shares of the source's diameter.
 const GATES: [f32; 2] = [0.1, 0.02];
@@ -79,8 +89,8 @@ impl CloudOptions {
 
     /// Creates a cloud from points in meters, with unit normals if there are any.
     ///
-    /// Points that are not finite or whose normal cannot be estimated are skipped
-    /// ([`Cloud::n_skipped`]).
+    /// Points that are not finite, lie exactly at (0, 0, 0) or whose normal cannot be estimated are
+    /// skipped ([`Cloud::n_skipped`]). Sensors write (0, 0, 0) where nothing was measured.
     ///
     /// # Errors
     ///
@@ -102,9 +112,24 @@ impl CloudOptions {
             point: *point,
             normal,
         };
+        let nowhere = Point3::from([f32::NAN; 3]);
+        let measured = |p: &Point3<f32>| if is_measured(p) { *p } else { nowhere };
+        let all: Vec<_> = points.iter().map(measured).collect();
         let (points, normals) = match self.voxel_meters {
-            Some(edge) => voxel_downsample(points, normals, edge),
-            None => (points.to_vec(), normals.map(<[_]>::to_vec)),
+            Some(edge) => {
+                let n_skipped = all.iter().filter(|p| !is_measured(p)).count();
+                let (mut means, mut directions) = voxel_downsample(&all, normals, edge);
+                if means.len() < all.len() {
+                    // Points that are not finite have no cell, but they count as skipped.
+                    means.resize(means.len() + n_skipped, nowhere);
+                    let unknown = Vector3::x_axis();
+                    if let Some(directions) = &mut directions {
+                        directions.resize(means.len(), unknown);
+                    }
+                }
+                (means, directions)
+            }
+            None => (all, normals.map(<[_]>::to_vec)),
         };
         let Some(normals) = normals else {
             if self.neighbors == 0 {
@@ -118,6 +143,11 @@ impl CloudOptions {
         };
         Ok(Cloud::new(points.iter().zip(normals).map(surfel)))
     }
+}
+
+/// Returns `true` if a point is finite and not at (0, 0, 0).
+fn is_measured(point: &Point3<f32>) -> bool {
+    point.iter().all(|x| x.is_finite()) && *point != Point3::origin()
 }
 
 /// The number of normals of a cloud differs from that of its points.
@@ -137,6 +167,9 @@ pub enum Registration {
     /// [`PointToPoint`], which needs no normals.
     PointToPoint,
     /// [`PointToPlane`], with the normals of the target.
+    ///
+    /// Rotations that the pairs do not determine stay as they are
+    /// ([`Degeneracy::FreezeRotations`]), unless noise makes them look determined.
     #[default]
     PointToPlane,
     /// [`Generalized`] ICP (GICP), plane to plane, with the normals of both.
@@ -166,7 +199,15 @@ impl Registration {
     pub fn build(self, max_distance: Option<f32>) -> BoxedStage {
         match self {
             Self::PointToPoint => stages(PointToPoint, max_distance),
-            Self::PointToPlane => stages(PointToPlane, max_distance),
+            Self::PointToPlane => {
+                let metric = Conditioned {
+                    metric: PointToPlane,
+                    policy: Degeneracy::FreezeRotations,
+                    threshold: FROZEN,
+                };
+                stages(metric, max_distance)
+            }
+            // From rough poses, the information of its pairs falls below the limit for a while.
             Self::Generalized => stages(Generalized::default(), max_distance),
         }
     }
@@ -174,7 +215,7 @@ impl Registration {
 
 fn stages<M>(metric: M, max_distance: Option<f32>) -> BoxedStage
 where
-    M: ErrorMetric + Clone + Send + 'static,
+    M: Minimize + Clone + Send + 'static,
 {
     let stage = |filter| Icp {
         selection: AllSamples,
@@ -225,9 +266,11 @@ impl std::fmt::Display for CloudSide {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum CloudWarning {
-    /// Points were skipped: they are not finite, or have no normal because their neighbors lie on a
-    /// line.
-    #[error("{side}: {count} points were skipped: they are not finite or determine no normal")]
+    /// Points were skipped: they are not finite, at (0, 0, 0), or have no normal because their
+    /// neighbors lie on a line.
+    #[error(
+        "{side}: {count} points were skipped: they are not finite, at (0, 0, 0) or determine no normal"
+    )]
     PointsSkipped {
         /// The cloud.
         side: CloudSide,
@@ -291,12 +334,69 @@ pub enum CloudWarning {
         /// Extent of the target.
         target_meters: f64,
     },
-    /// The pairs do not determine all six directions, as on a plane or a sphere.
+    /// A length of the preparation or the pipeline exceeds the extent of a cloud.
     ///
-    /// A direction that is left open can look determined: the rotation of a can by the noise of its
-    /// normals, and a shift along a plane by the error of [`PointToPoint`].
-    #[error("the clouds do not determine every direction of the pose")]
-    Undetermined,
+    /// An extent is the diagonal of a cloud's bounding box.
+    #[error(
+        "{name} is {}, more than the extent of the {side}, {}: expected meters",
+        Meters(*meters),
+        Meters(*extent_meters)
+    )]
+    TooLong {
+        /// The name of the length.
+        name: &'static str,
+        /// The length.
+        meters: f64,
+        /// The cloud.
+        side: CloudSide,
+        /// Its extent.
+        extent_meters: f64,
+    },
+    /// The surface does not determine all six directions, as on a plane, a sphere or a can.
+    ///
+    /// Noise makes such a direction look determined. Therefore normals of the source are compared
+    /// with those of the target: their noise is independent, so only the surface is common to them.
+    #[error(
+        "the clouds do not determine {directions} of the 6 directions of the pose{}: do not trust them",
+        around(axis.as_ref())
+    )]
+    Undetermined {
+        /// Number of directions, 1 to 6.
+        directions: usize,
+        /// The axis of the rotations among them, in the frame of the target; `None` if there are
+        /// none, or rotations around several axes.
+        axis: Option<[f64; 3]>,
+    },
+}
+
+impl CloudWarning {
+    /// Returns [`CloudWarning::TooLong`] if a length in meters exceeds the extent of the points.
+    #[must_use]
+    pub fn of_length(
+        name: &'static str,
+        meters: Option<f32>,
+        side: CloudSide,
+        points: &[Point3<f32>],
+    ) -> Option<Self> {
+        let meters = f64::from(meters?);
+        let [low, high] = bounds(points.iter().copied().filter(is_measured))?;
+        let extent_meters = f64::from((high - low).norm());
+        (meters > extent_meters).then_some(Self::TooLong {
+            name,
+            meters,
+            side,
+            extent_meters,
+        })
+    }
+}
+
+/// Returns the words about an axis of rotation.
+fn around(axis: Option<&[f64; 3]>) -> String {
+    axis.map_or_else(String::new, |[x, y, z]| {
+        format!(
+            ", among them the rotation around the axis ({x:.2}, {y:.2}, {z:.2}) of the target frame"
+        )
+    })
 }
 
 /// The pose between two clouds, and how well they fit.
@@ -333,12 +433,13 @@ impl Alignment {
     /// Returns the 6×6 covariance of the pose for ξ = [ρ; φ] (translation first, meters and
     /// radians), a left perturbation in the frame of the target.
     ///
-    /// `None` if a direction is not determined.
+    /// `None` if a direction is not determined ([`CloudWarning::Undetermined`]). It does not
+    /// contain wrong pairs, so it is optimistic where the clouds overlap in part.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
+        let is_open = |w: &CloudWarning| matches!(w, CloudWarning::Undetermined { .. });
         let quality = self.outcome.quality.as_ref()?;
-        let determined = quality.observability()?.n_degenerate(UNDETERMINED) == 0;
-        quality.covariance().filter(|_| determined)
+        (quality.covariance()).filter(|_| !self.warnings.iter().any(is_open))
     }
 }
 
@@ -348,6 +449,11 @@ impl Alignment {
 /// [`Observation`](hicp_core::Observation). The pipeline is a [`Registration`] or any stage. If a
 /// part of it needs an image or a mesh that is absent, the outcome keeps the initial pose and names
 /// the part. Never fails on data: without overlap, the outcome states that no pairs were found.
+///
+/// Fitness and RMSE do not prove a pose. A can that is rotated around its axis fits as well as at
+/// the truth, and a box on its wrong side can fit better. Start from a rough pose, and read the
+/// warnings: [`CloudWarning::Undetermined`] names what the surface leaves open. A wrong pose that
+/// the surface does determine has no warning.
 ///
 /// A loop that registers many scans reuses its memory with [`align_in`].
 ///
@@ -424,11 +530,51 @@ pub fn align_in<'a>(
     } else if fitness < LITTLE_OVERLAP {
         Some(CloudWarning::LittleOverlap { fitness })
     } else {
-        let open = alignment.covariance().is_none();
-        open.then_some(CloudWarning::Undetermined)
+        None
     };
     alignment.warnings.extend(reason);
+    let open = (outcome.quality).and_then(|q| undetermined(&q, session.workspace.pairs()));
+    alignment.warnings.extend(open);
     alignment
+}
+
+/// Returns the warning about directions that the pairs, or the surface that they show, leave open.
+fn undetermined(quality: &Quality, pairs: &Correspondences) -> Option<CloudWarning> {
+    let of_pairs = quality.observability()?;
+    let n_open = |found: &Observability| found.n_degenerate(UNDETERMINED);
+    let of_surface = surface(&of_pairs, pairs).filter(|_| n_open(&of_pairs) == 0);
+    let found = of_surface.unwrap_or(of_pairs);
+    let directions = n_open(&found);
+    let rotations = found.directions[..directions].iter().map(|d| {
+        let axis: Vector3<f64> = d.fixed_rows::<3>(3).into_owned();
+        axis * axis.transpose()
+    });
+    let rotations = eigen3(&rotations.sum::<Matrix3<f64>>())?;
+    let sizes = rotations.eigenvalues.map(|size| size > ROTATION);
+    let several = sizes.iter().filter(|large| **large).count() > 1;
+    let axis = rotations.eigenvectors.column(rotations.eigenvalues.imax());
+    let axis = (sizes.iter().any(|large| *large) && !several).then(|| [axis.x, axis.y, axis.z]);
+    (directions > 0).then_some(CloudWarning::Undetermined { directions, axis })
+}
+
+/// Returns the motions that the surface determines, without the information of noise.
+///
+/// Noise of normals adds its square to the JᵀJ of the target. In ½ (JᵀK + KᵀJ), where K has normals
+/// that are estimated from the points of the source alone, its mean is zero.
+fn surface(of_pairs: &Observability, pairs: &Correspondences) -> Option<Observability> {
+    let points: Vec<_> = pairs.as_slice().iter().map(|p| p.source.point).collect();
+    let normals = estimate_normals(&points, CloudOptions::default().neighbors);
+    let mut common = NormalEquations::new(of_pairs.pivot, of_pairs.length);
+    for (pair, normal) in pairs.as_slice().iter().zip(normals) {
+        let Some(normal) = normal else { continue };
+        let (point, weight) = (pair.source.point.cast::<f64>(), f64::from(pair.weight));
+        let target = pair.target.normal.into_inner().cast::<f64>();
+        let source = normal.into_inner().cast::<f64>();
+        let source = source * source.dot(&target).signum();
+        common.add_row(&point, &((target + source) / 2.0), 0.0, weight);
+        common.add_row(&point, &((target - source) / 2.0), 0.0, -weight);
+    }
+    common.observability()
 }
 
 /// Returns the warning about two clouds whose extents differ as if their units did.

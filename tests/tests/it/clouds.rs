@@ -190,8 +190,123 @@ fn spheres_have_no_covariance() {
             &mut *kind.build(None),
         );
         assert!(found.covariance().is_none(), "{kind:?}");
-        assert_eq!(found.warnings.last(), Some(&CloudWarning::Undetermined));
+        // Rotations around every axis.
+        assert!(matches!(open(&found), Some((3.., None))), "{found:?}");
     }
+}
+
+/// Returns the number of directions that a warning calls open, and the axis of their rotations.
+fn open(found: &Alignment) -> Option<(usize, Option<[f64; 3]>)> {
+    found.warnings.iter().find_map(|warning| match warning {
+        CloudWarning::Undetermined { directions, axis } => Some((*directions, *axis)),
+        _ => None,
+    })
+}
+
+/// Returns noisy points of an upright object that are visible from one side.
+fn view(object: Household, count: usize, azimuth: f64, noise: f64) -> Vec<Point3<f32>> {
+    let mut random = rng(count as u64);
+    let model = object.model().unwrap();
+    let viewer = Vector3::new(azimuth.cos(), azimuth.sin(), 0.4);
+    let seen = sample_surface(model.mesh(), count).into_iter();
+    let seen = seen.filter(|surfel| surfel.normal.cast::<f64>().dot(&viewer) > 0.15);
+    let mut offset = || (0..12).map(|_| random.random::<f64>() - 0.5).sum::<f64>() * noise;
+    let point = |surfel: Surfel| {
+        let error = Vector3::new(offset(), offset(), offset());
+        (surfel.point.cast::<f64>() + error).cast::<f32>()
+    };
+    seen.map(point).collect()
+}
+
+/// Two views of a roll of tape: its borders pull it around its axis, to where the views overlap
+/// most.
+#[test]
+fn an_undetermined_rotation_stays_as_it_is() {
+    let [source, target] = [(12_000, 0.0), (13_000, 1.0)]
+        .map(|(n, azimuth)| cloud(&view(Household::Tape, n, azimuth, 1e-4)));
+    let start = Isometry3::identity();
+    let mut pipeline = Registration::PointToPlane.build(None);
+    let found = align(&source, &target, &start, &mut pipeline);
+    let (angle, distance) = se3::pose_distance(&found.target_from_source(), &start);
+    assert!(
+        angle.to_degrees() < 0.2 && distance < 1e-3,
+        "{angle} {distance}"
+    );
+    assert!(matches!(open(&found), Some((1, Some(_)))), "{found:?}");
+}
+
+/// Noise of normals gives the pairs of a can more information about its axis than the limit.
+#[test]
+fn noise_does_not_determine_a_rotation() {
+    for (object, is_open) in [(Household::Can, true), (Household::Mug, false)] {
+        let [source, target] = [(12_000, 0.0), (13_000, 1.0)]
+            .map(|(n, azimuth)| cloud(&view(object, n, azimuth, 1e-3)));
+        for kind in [Registration::PointToPlane, Registration::Generalized] {
+            let found = align(
+                &source,
+                &target,
+                &Isometry3::identity(),
+                &mut *kind.build(None),
+            );
+            let pairs = found.outcome.quality.unwrap().observability().unwrap();
+            assert!(pairs.eigenvalues[0] > 0.01, "{object:?} {kind:?} {pairs:?}");
+            assert_eq!(found.covariance().is_none(), is_open, "{object:?} {kind:?}");
+            match open(&found) {
+                Some((1, Some([_, _, z]))) if is_open => {
+                    assert!(z.abs() > 0.99, "{found:?}");
+                    let text = found.warnings.last().unwrap().to_string();
+                    assert!(
+                        text.contains("1 of the 6 directions of the pose, among them"),
+                        "{text}"
+                    );
+                }
+                other => assert!(other.is_none() && !is_open, "{object:?} {kind:?} {other:?}"),
+            }
+        }
+    }
+}
+
+/// Sensors write (0, 0, 0) where nothing was measured.
+#[test]
+fn points_at_zero_are_skipped_and_counted() {
+    let mut with_zeros = points(1000);
+    with_zeros.splice(0..0, [Point3::origin(); 300]);
+    with_zeros.push(Point3::new(f32::NAN, 0.0, 0.0));
+    let up = vec![Vector3::z_axis(); with_zeros.len()];
+    for voxel_meters in [None, Some(0.004), Some(1e-9)] {
+        let options = CloudOptions {
+            voxel_meters,
+            ..CloudOptions::default()
+        };
+        for normals in [None, Some(&up[..])] {
+            let cloud = options.cloud(&with_zeros, normals).unwrap();
+            assert_eq!(cloud.n_skipped(), 301, "{voxel_meters:?}");
+            let at_zero = |surfel: &Surfel| surfel.point == Point3::origin();
+            assert!(!cloud.surfels().iter().any(at_zero) && cloud.surfels().len() > 500);
+        }
+    }
+}
+
+#[test]
+fn lengths_beyond_the_extent_are_named() {
+    // Zeros do not count, far from which this cloud is.
+    let far = moved(&points(500), &Isometry3::translation(30.0, 0.0, 0.0));
+    let far = [&far[..], &[Point3::origin()]].concat();
+    let warned = |meters| CloudWarning::of_length("voxel", Some(meters), CloudSide::Target, &far);
+    assert_eq!((warned(0.05), warned(f32::NAN)), (None, None));
+    let text = warned(2.0).unwrap().to_string();
+    assert!(
+        text.starts_with("voxel is 2.0000 m, more than the extent of the target, 0."),
+        "{text}"
+    );
+    assert_eq!(
+        CloudWarning::of_length("voxel", None, CloudSide::Target, &far),
+        None
+    );
+    assert_eq!(
+        CloudWarning::of_length("voxel", Some(2.0), CloudSide::Target, &[]),
+        None
+    );
 }
 
 #[test]
@@ -224,7 +339,11 @@ fn a_coplanar_cloud_does_not_slide() {
         "{shift}"
     );
     assert!(found.covariance().is_none());
-    assert!(found.warnings.contains(&CloudWarning::Undetermined));
+    // Two shifts, and the rotation around the normal.
+    let Some((3, Some([_, _, z]))) = open(&found) else {
+        panic!("{found:?}")
+    };
+    assert!(z.abs() > 0.999, "{z}");
 }
 
 #[test]
