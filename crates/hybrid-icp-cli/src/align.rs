@@ -7,7 +7,7 @@ use clap::builder::RangedU64ValueParser;
 use hicp_io::{LengthUnit, PointCloud};
 use hybrid_icp::core::{Isometry3, Matrix6};
 use hybrid_icp::icp::Verdict;
-use hybrid_icp::{CloudOptions, CloudWarning, Registration, align};
+use hybrid_icp::{CloudOptions, CloudSide, CloudWarning, Registration, align};
 use serde_json::json;
 
 use crate::limits::limits;
@@ -23,6 +23,10 @@ use crate::terminal::{check_stdout, say, warn};
 /// outcome (refined or kept_initial), termination, iterations, fitness (share of the source points
 /// with a counterpart), rmse_m, the 6x6 covariance (translation first, meters and radians; null if
 /// a direction is not determined), and the warnings that are also on standard error.
+///
+/// Fitness and RMSE do not prove the pose: a can slides around its axis, and a box on its wrong
+/// side can fit better than the truth. Start from a rough pose, and read the warning about
+/// directions that the clouds do not determine. Points at exactly (0, 0, 0) are skipped.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -51,11 +55,12 @@ pub(crate) struct Arguments {
     /// The error to minimize: point-to-point, point-to-plane or gicp.
     #[arg(long, value_name = "NAME", default_value = Registration::default().name())]
     method: Registration,
-    /// Largest distance of a pair, meters. If not given: a tenth of the source's diameter, then a
-    /// fiftieth.
+    /// Largest distance of a pair, meters whatever --unit is. If not given: a tenth of the source's
+    /// diameter, then a fiftieth.
     #[arg(long, value_name = "METERS", value_parser = positive)]
     max_distance: Option<f64>,
-    /// Replace the points in cubic cells of this edge by their mean first, meters.
+    /// Replace the points in cubic cells of this edge by their mean first, meters whatever --unit
+    /// is.
     #[arg(long, value_name = "METERS", value_parser = positive)]
     voxel: Option<f64>,
     /// Number of neighbors from which normals are estimated if a file has none, at least 3.
@@ -86,8 +91,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         voxel_meters: meters(arguments.voxel),
         neighbors: arguments.neighbors,
     };
-    let mut warnings = Vec::new();
-    let mut read = |path: &PathBuf, unit, options: CloudOptions| -> anyhow::Result<_> {
+    let (mut warnings, mut lengths) = (Vec::new(), Vec::new());
+    let max_distance = meters(arguments.max_distance);
+    let mut read = |path: &PathBuf, unit, options: CloudOptions, side| -> anyhow::Result<_> {
         let PointCloud {
             points,
             normals,
@@ -100,12 +106,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 points.len() + n_skipped
             ));
         }
+        let limit = max_distance.filter(|_| side == CloudSide::Target);
+        for (name, length) in [("--voxel", options.voxel_meters), ("--max-distance", limit)] {
+            lengths.extend(CloudWarning::of_length(name, length, side, &points));
+        }
         Ok(options.cloud(&points, normals.as_deref())?)
     };
     let (unit, of_source) = (arguments.unit, options.for_source_of(method));
-    let source = read(&arguments.source, unit, of_source)?;
+    let source = read(&arguments.source, unit, of_source, CloudSide::Source)?;
     let target_unit = arguments.target_unit.unwrap_or(unit);
-    let target = read(&arguments.target, target_unit, options)?;
+    let target = read(&arguments.target, target_unit, options, CloudSide::Target)?;
     let init = match init {
         Some(path) => {
             limits()
@@ -114,19 +124,22 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         None => Isometry3::identity(),
     };
-    let mut pipeline = method.build(meters(arguments.max_distance));
+    let mut pipeline = method.build(max_distance);
     let found = align(&source, &target, &init, &mut pipeline);
 
     let in_words = |warning: &CloudWarning| match warning {
         CloudWarning::Extents { .. } => {
             format!("{warning}: check --unit {unit} and --target-unit {target_unit}")
         }
-        CloudWarning::LittleOverlap { .. } if found.outcome.n_pairs() == 0 => {
+        // A length that is too long is the reason.
+        CloudWarning::LittleOverlap { .. }
+            if lengths.is_empty() && found.outcome.n_pairs() == 0 =>
+        {
             format!("{warning}: check --init and its unit, --unit {unit} and --max-distance")
         }
         _ => warning.to_string(),
     };
-    warnings.extend(found.warnings.iter().map(in_words));
+    warnings.extend(lengths.iter().chain(&found.warnings).map(in_words));
     let (pose, termination) = (found.target_from_source(), found.outcome.termination);
     let rows = |m: Matrix6<f64>| [0, 1, 2, 3, 4, 5].map(|i| [0, 1, 2, 3, 4, 5].map(|j| m[(i, j)]));
     let matrix = pose.to_homogeneous();

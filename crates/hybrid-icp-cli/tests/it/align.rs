@@ -61,6 +61,51 @@ fn points_that_are_not_finite_are_counted() {
 }
 
 #[test]
+fn points_at_zero_are_skipped_in_both_clouds() {
+    let folder = Folder::new();
+    write_clouds(&folder, &Isometry3::identity());
+    let found = folder.command("align b.pcd a.ply").exits(0).json();
+    let cloud = hicp_io::read_cloud(folder.path("b.pcd"), hicp_io::LengthUnit::Meters).unwrap();
+    let rows = cloud
+        .points
+        .iter()
+        .map(|p| format!("{} {} {}\n", p.x, p.y, p.z));
+    folder.write(
+        "zeros.xyz",
+        "0 0 0\n".repeat(500) + &rows.collect::<String>(),
+    );
+    for (clouds, side) in [("zeros.xyz a.ply", "source"), ("a.ply zeros.xyz", "target")] {
+        let run_ = folder.command(format!("align {clouds}")).exits(0);
+        let warning = format!("{side}: 500 points were skipped: they are not finite, at (0, 0, 0)");
+        assert_contains(&run_.err, &[&warning]);
+        if side == "source" {
+            assert_eq!(run_.json()["fitness"], found["fitness"]);
+        }
+    }
+}
+
+#[test]
+fn lengths_in_another_unit_are_warned_of() {
+    let folder = Folder::new();
+    write_clouds(&folder, &Isometry3::identity());
+    let warned = |words: &str| {
+        let run_ = folder
+            .command(format!("align a.ply b.pcd {words}"))
+            .exits(0);
+        assert!(!run_.err.contains("check --init"), "{}", run_.err);
+        run_
+    };
+    warned("--max-distance 5")
+        .complains(&["--max-distance is 5.0000 m, more than the extent of the target"]);
+    warned("--voxel 2").complains(&[
+        "--voxel is 2.0000 m, more than the extent of the source",
+        "--voxel is 2.0000 m, more than the extent of the target",
+    ]);
+    let run_ = warned("--max-distance 0.01 --voxel 0.002");
+    assert!(!run_.err.contains("more than the extent"), "{}", run_.err);
+}
+
+#[test]
 fn clouds_that_do_not_overlap_are_warned_of() {
     let folder = Folder::new();
     write_clouds(&folder, &Isometry3::translation(5.0, 0.0, 0.0));
