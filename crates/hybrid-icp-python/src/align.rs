@@ -7,7 +7,7 @@ use hicp_io::{LengthUnit, PointCloud};
 use hybrid_icp::core::{Cloud, Isometry3, Point3, UnitVector3};
 use hybrid_icp::icp::{IterationEvent, Observer, Session, Workspace};
 use hybrid_icp::raster::Rasterizer;
-use hybrid_icp::{CloudOptions, Registration};
+use hybrid_icp::{CloudOptions, CloudSide, CloudWarning, Registration};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, Motion};
@@ -16,15 +16,20 @@ use crate::results;
 
 /// Registers two point clouds: finds the pose that moves the source onto the target.
 ///
-/// Points that are not finite are skipped, with a warning in the result. Absent normals are
-/// estimated if the method needs them, which is a warning, too. Ctrl-C stops it.
+/// Points that are not finite or at exactly (0, 0, 0) are skipped, with a warning in the result.
+/// Absent normals are estimated if the method needs them, which is a warning, too. Ctrl-C stops it.
+///
+/// Fitness and RMSE do not prove the pose: a can slides around its axis, and a box on its wrong
+/// side can fit better than the truth. Start from a rough pose, and read the warning about
+/// directions that the clouds do not determine.
 ///
 /// Parameters
 /// ----------
 /// source, target : array_like, shape (N, 3), float32
 ///     Points, meters.
 /// T_ts : array_like, shape (4, 4), optional
-///     The rough pose, target from source, meters. The default is the identity.
+///     The rough pose, target from source, meters. The default is the identity. A translation
+///     above 100 m is probably in millimeters, and causes a warning.
 /// source_normals, target_normals : array_like, shape (N, 3), float32, optional
 ///     One normal per point, of any length above 0. Points whose normal is zero are skipped.
 /// method : {"point-to-plane", "point-to-point", "gicp"}, optional
@@ -77,6 +82,14 @@ pub(crate) fn align<'py>(
         Some(pose) => array::motion_of_cloud(pose, "T_ts")?,
         None => Motion::new(Isometry3::identity()),
     };
+    let mut lengths: Vec<_> = [&source, &target]
+        .into_iter()
+        .zip([CloudSide::Source, CloudSide::Target])
+        .filter_map(|(cloud, side)| CloudWarning::of_length("voxel", voxel, side, &cloud.points))
+        .collect();
+    let side = CloudSide::Target;
+    let limit = CloudWarning::of_length("max_distance", max_distance, side, &target.points);
+    lengths.extend(limit);
     let alignment = py.detach(|| -> PyResult<_> {
         let source = source.cloud(&options.for_source_of(method))?;
         let target = target.cloud(&options)?;
@@ -88,7 +101,19 @@ pub(crate) fn align<'py>(
         let found = hybrid_icp::align_in(&source, &target, init, &mut pipeline, &mut session);
         signals.0.map(|()| found)
     })?;
-    results::alignment(py, &alignment, &init)
+    let in_words = |warning: &CloudWarning| match warning {
+        CloudWarning::LittleOverlap { .. }
+            if lengths.is_empty() && alignment.outcome.n_pairs() == 0 =>
+        {
+            format!("{warning}: check T_ts, that it and the points are in meters, and max_distance")
+        }
+        _ => warning.to_string(),
+    };
+    let warnings = lengths.iter().chain(&alignment.warnings).map(in_words);
+    let warnings = array::millimeters(&init.matrix, "T_ts")
+        .into_iter()
+        .chain(warnings);
+    results::alignment(py, &alignment, &init, warnings.collect())
 }
 
 /// Reads a point cloud in meters, from a file of any supported format.

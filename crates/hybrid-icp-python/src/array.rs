@@ -240,14 +240,19 @@ pub(crate) fn motions(
 
 /// Returns an error if the translation of a 4×4 matrix is probably in millimeters.
 fn check_meters(matrix: &[f64], name: &str) -> PyResult<()> {
+    millimeters(matrix, name).map_or(Ok(()), |text| Err(InputError::new_err(text)))
+}
+
+/// Returns what is wrong if the translation of a 4×4 matrix is probably in millimeters.
+pub(crate) fn millimeters(matrix: &[f64], name: &str) -> Option<String> {
     let [x, y, z] = [matrix[3], matrix[7], matrix[11]];
-    if [x, y, z].iter().any(|t| t.abs() > MAX_TRANSLATION_METERS) {
-        return Err(InputError::new_err(format!(
+    let far = [x, y, z].iter().any(|t| t.abs() > MAX_TRANSLATION_METERS);
+    far.then(|| {
+        format!(
             "{name} looks like millimeters: its translation is ({x}, {y}, {z}), expected meters \
              within ±{MAX_TRANSLATION_METERS}"
-        )));
-    }
-    Ok(())
+        )
+    })
 }
 
 /// Reads a rigid motion from 16 row-major numbers.

@@ -163,7 +163,12 @@ pub(crate) fn result<'py>(
 }
 
 /// Creates the result of a registration of clouds from the pose `init`.
-pub(crate) fn alignment<'py>(py: Python<'py>, alignment: &Alignment, init: &Motion) -> Record<'py> {
+pub(crate) fn alignment<'py>(
+    py: Python<'py>,
+    alignment: &Alignment,
+    init: &Motion,
+    warnings: Vec<String>,
+) -> Record<'py> {
     let outcome = &alignment.outcome;
     record!(
         py,
@@ -175,7 +180,7 @@ pub(crate) fn alignment<'py>(py: Python<'py>, alignment: &Alignment, init: &Moti
             fitness: alignment.fitness(),
             rmse: alignment.rmse(),
             covariance: alignment.covariance().as_ref().map(Matrix::from),
-            warnings: texts(&alignment.warnings),
+            warnings: warnings,
         }
     )
 }

@@ -49,6 +49,34 @@ def test_hostile_points_keep_the_pose():
             hi.align(source, source, **arguments)
 
 
+def test_other_units_are_named():
+    source = surface()
+    motion = pose([0.01, -0.01, 0.005], [0.2, 0.2, -0.1])
+    target = source @ motion[:3, :3].T + motion[:3, 3]
+    millimeters = motion.copy()
+    millimeters[:3, 3] *= 1000
+    texts = hi.align(1000 * source, 1000 * target, millimeters).warnings
+    assert "T_ts looks like millimeters" in texts[0]
+    texts = hi.align(source, target, motion, max_distance=5).warnings
+    assert "max_distance is 5.0000 m, more than the extent of the target" in texts[0]
+    texts = hi.align(source, target, motion, voxel=2).warnings
+    assert "voxel is 2.0000 m, more than the extent of the source" in texts[0]
+    assert "extent of the target" in texts[1]
+    assert not any("check T_ts" in text for text in texts)
+    texts = hi.align(source, target + 9).warnings
+    assert any("check T_ts, that it and the points are in meters" in text for text in texts)
+    right = hi.align(source, target, motion, max_distance=0.05, voxel=0.002).warnings
+    assert not any("meters" in text for text in right)
+
+
+def test_points_at_zero_are_skipped():
+    source = surface()
+    expected = hi.align(source, source)
+    result = hi.align(np.vstack([np.zeros((400, 3)), source]), source)
+    assert result.fitness == expected.fitness
+    assert "source: 400 points were skipped" in result.warnings[0]
+
+
 def test_clouds_of_files_are_read_in_meters(tmp_path):
     points = surface().astype(np.float32)
     up = np.tile([0, 0, 1], (len(points), 1))

@@ -1189,15 +1189,20 @@ class Tracker:
 def align(source: npt.ArrayLike, target: npt.ArrayLike, T_ts: npt.ArrayLike | None=None, *, source_normals: npt.ArrayLike | None=None, target_normals: npt.ArrayLike | None=None, method: Literal['point-to-plane', 'point-to-point', 'gicp']='point-to-plane', max_distance: float | None=None, voxel: float | None=None, neighbors: int=20) -> Alignment:
     """Registers two point clouds: finds the pose that moves the source onto the target.
 
-    Points that are not finite are skipped, with a warning in the result. Absent normals are
-    estimated if the method needs them, which is a warning, too. Ctrl-C stops it.
+    Points that are not finite or at exactly (0, 0, 0) are skipped, with a warning in the result.
+    Absent normals are estimated if the method needs them, which is a warning, too. Ctrl-C stops it.
+
+    Fitness and RMSE do not prove the pose: a can slides around its axis, and a box on its wrong
+    side can fit better than the truth. Start from a rough pose, and read the warning about
+    directions that the clouds do not determine.
 
     Parameters
     ----------
     source, target : array_like, shape (N, 3), float32
         Points, meters.
     T_ts : array_like, shape (4, 4), optional
-        The rough pose, target from source, meters. The default is the identity.
+        The rough pose, target from source, meters. The default is the identity. A translation
+        above 100 m is probably in millimeters, and causes a warning.
     source_normals, target_normals : array_like, shape (N, 3), float32, optional
         One normal per point, of any length above 0. Points whose normal is zero are skipped.
     method : {"point-to-plane", "point-to-point", "gicp"}, optional
