@@ -26,6 +26,18 @@ def test_a_moving_object_is_tracked_lost_and_found(scene):
     assert tracker.step(depth, 1 / 30, np.zeros((240, 320), bool)).state != "tracking"
 
 
+def test_the_state_belongs_to_the_pose_even_if_the_time_is_wrong(scene):
+    """Duplicate time stamps and wrong units make a filter lag behind the object."""
+    motion = pose([0.02, 0.01, 0.0], [0.01, 0.0, -0.005])
+    for seconds in (0, 1e-4):
+        tracker, true = hi.Tracker(scene.model, scene.camera, scene.true), scene.true
+        for _ in range(4):
+            tracked = tracker.step(hi.render_depth(scene.model, scene.camera, true), seconds)
+            assert tracked.state == "tracking"
+            assert hi.mssd(tracked.T_co, true, scene.model) < 0.05 * scene.model.diameter
+            true = motion @ true
+
+
 def test_images_of_another_size_are_refused(scene):
     tracker = hi.Tracker(scene.model, scene.camera, scene.true)
     with pytest.raises(hi.InputError, match="4x3"):
@@ -40,9 +52,11 @@ def test_implausible_arguments_are_refused_or_cause_a_warning(scene):
     with pytest.warns(hi.InputWarning, match="behind the camera, .* not object from camera"):
         hi.Tracker(scene.model, scene.camera, np.linalg.inv(scene.true))
     tracker = hi.Tracker(scene.model, scene.camera, scene.true)
-    for seconds in (-1 / 30, np.nan, np.inf, 33.0):
+    for seconds in (-1 / 30, np.nan, np.inf, 33.0, None, scene.depth):
         with pytest.raises(hi.InputError, match=r"seconds is .*, expected the seconds since"):
             tracker.step(scene.depth, seconds)
+    with pytest.raises(hi.InputError, match="seconds is an array"):
+        tracker.step(1 / 30, scene.depth)
     assert repr(tracker) == "Tracker(started, t = (0.0200, -0.0100, 0.4200) m)"
     tracker.step(scene.depth, 0)
     assert repr(tracker).startswith("Tracker(tracking, t = (0.0")

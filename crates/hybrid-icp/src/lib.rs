@@ -117,7 +117,7 @@ pub use refiner::{Refinement, Refiner};
 pub use sequential::SequentialEstimator;
 pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs};
 pub use trace::{StageRecord, Trace};
-pub use tracker::{TrackState, Tracked, Tracker, TrackerConfig};
+pub use tracker::{TrackError, TrackState, Tracked, Tracker, TrackerConfig};
 pub use warning::{CenterFault, Warning};
 
 /// The names that most programs and most custom components need: `use hybrid_icp::prelude::*;`.

@@ -13,14 +13,14 @@ mod tracked;
 use std::sync::Arc;
 
 use hicp_core::internal::check_size;
-use hicp_core::{DepthImage, ImageError, Isometry3, Mask, Matrix6, Model, PinholeCamera, se3};
+use hicp_core::{DepthImage, Isometry3, Mask, Matrix6, Model, PinholeCamera, se3};
 use hicp_score::Evidence;
 
 use self::finder::{CERTAIN, CLEARLY};
 use self::found::Found;
 use self::matcher::Matcher;
 use self::motion::Motion;
-pub use self::tracked::{TrackState, Tracked, TrackerConfig};
+pub use self::tracked::{TrackError, TrackState, Tracked, TrackerConfig};
 
 /// Standard deviation of the pose at the start, in radii of the object and in radians.
 const START_RADII: f64 = 0.2;
@@ -39,7 +39,8 @@ const NEAR_DIAMETERS: f64 = 0.4;
 /// around its predicted silhouette whose depth is near the predicted one, so it may lie in a hand
 /// or on a table, and neither the camera nor the object has to stand still. The filter combines
 /// both. It also determines the directions in which the pose is uncertain, for example the rotation
-/// of a mug whose handle is hidden.
+/// of a mug whose handle is hidden. If the combined pose is far from the registered one, for
+/// example because a time is wrong, the filter starts again from the registered one, at rest.
 ///
 /// The [`Evidence`] at the pose decides about the state. A hidden pixel is never evidence for a
 /// pose: an object that is hidden entirely is lost after
@@ -122,19 +123,24 @@ impl Tracker {
 
     /// Tracks the object in the next image.
     ///
-    /// `seconds` is the time since the image before. A mask is not needed; if there is one, the
-    /// object is looked for only in its pixels. Before [`Tracker::start`], the result is the
-    /// identity with the state [`TrackState::Lost`]. Deterministic.
+    /// `seconds` is the time since the previous image, 0 for one of the same instant. A mask is not
+    /// needed; if there is one, the object is looked for only in its pixels. Before
+    /// [`Tracker::start`], the result is the identity with the state [`TrackState::Lost`].
+    /// Deterministic.
     ///
     /// # Errors
     ///
-    /// [`ImageError`] if the sizes of the image, the mask and the camera differ.
+    /// [`TrackError`] if the sizes of the image, the mask and the camera differ, or if the time is
+    /// negative or not finite. The tracker then stays as it was.
     pub fn step(
         &mut self,
         depth: &Arc<DepthImage>,
         seconds: f64,
         mask: Option<&Mask>,
-    ) -> Result<Tracked, ImageError> {
+    ) -> Result<Tracked, TrackError> {
+        if !(seconds.is_finite() && seconds >= 0.0) {
+            return Err(TrackError::Seconds { found: seconds });
+        }
         let camera = self.matcher.camera.size();
         check_size("depth image", depth.size(), "camera", camera)?;
         if let Some(mask) = mask {
@@ -148,11 +154,6 @@ impl Tracker {
                 deviation_meters: f64::INFINITY,
             });
         };
-        let seconds = if seconds.is_finite() {
-            seconds.max(0.0)
-        } else {
-            0.0
-        };
         motion.predict(seconds);
         if let Some(trial) = &mut self.trial {
             trial.without.predict(seconds);
@@ -164,8 +165,11 @@ impl Tracker {
         }
         let counts = |f: &Found| if lost { f.stands_alone() } else { f.explains() };
         let measured = found.filter(|(found, _)| counts(found));
-        if let Some((found, covariance)) = &measured {
-            motion.update(&found.pose, covariance);
+        if let Some(measured) = &measured
+            && !motion.update(&measured.0.pose, &measured.1)
+        {
+            // The evidence is that of the measured pose, so return no other one.
+            motion = self.at(measured);
         }
         let found = found.map(|(found, _)| found);
         let mut seen = measured.map(|(found, _)| found);

@@ -27,9 +27,9 @@ use crate::terminal::{counted, progress_bar, say, warn};
 ///
 /// The output has one line of JSON per image: the pose (cam_R_m2c, cam_t_m2c in mm), the state
 /// (tracking, doubtful or lost), and the evidence. The score is the share of the visible pixels
-/// that agree with the pose. While an object is lost, its pose is a guess, and it is searched
-/// around it, and the result file has no row. deviation_mm is the standard deviation of the least
-/// determined displacement.
+/// that agree with the pose (in Python, `agreement`). While an object is lost, its pose is a guess,
+/// and it is searched around it, and the result file has no row. deviation_mm is the standard
+/// deviation of the least determined displacement (in Python, `deviation`, in meters).
 ///
 /// The exit code is 0 even if the object is lost; the summary counts the states. The pose in an
 /// image whose depth is missing or damaged is predicted. If a file is damaged, the exit code is 1,
@@ -53,6 +53,9 @@ Example:
   hybrid-icp bop generate --scenes 1 --images 20 --moving --out moving
   hybrid-icp bop track --dataset moving --scene 1 --object 1 \\
       --init moving/initial_synthetic-test.csv --output tracked.jsonl";
+
+/// The largest plausible rate of images. Higher ones are probably in other units.
+const MAX_FPS: f64 = 1000.0;
 
 /// The result of an image.
 struct Line {
@@ -89,6 +92,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         counted(lines.len(), "image"),
         summarize(&lines),
     ))?;
+    let fps = arguments.fps;
+    if fps > MAX_FPS {
+        warn(format_args!(
+            "--fps is {fps}, expected the number of images per second, at most {MAX_FPS}: the \
+             motion of the object is not predicted"
+        ));
+    }
     let diameters = models::wrong_diameters(&models, &dataset.models_info_path()?);
     diameters.values().for_each(warn);
     let tracking = |line: &Line| line.tracked.state == TrackState::Tracking;

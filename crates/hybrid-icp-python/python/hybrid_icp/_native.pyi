@@ -1161,7 +1161,8 @@ class Tracker:
         depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
             In meters, as for `Observation`, in the size of the camera.
         seconds : float
-            Time since the previous image, at most 10. Restart the tracker after a longer pause.
+            Time since the previous image, not a time stamp: 0 for an image of the same instant, at
+            most 10. Restart the tracker after a longer pause.
         mask : numpy.ndarray, shape (H, W), optional
             Pixels to which the object is restricted. Not needed.
         scale : float, optional

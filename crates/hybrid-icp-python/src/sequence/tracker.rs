@@ -2,11 +2,11 @@
 
 use std::sync::Mutex;
 
-use hybrid_icp::core::{ImageError, Isometry3};
-use hybrid_icp::{Tracker, TrackerConfig, warning_of_distance};
+use hybrid_icp::core::Isometry3;
+use hybrid_icp::{TrackError, Tracker, TrackerConfig, warning_of_distance};
 use pyo3::prelude::*;
 
-use crate::array::{self, Matrix};
+use crate::array::{self, Matrix, unexpected};
 use crate::errors::InputError;
 use crate::input::camera::PyCamera;
 use crate::input::depth;
@@ -117,7 +117,8 @@ impl PyTracker {
     /// depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
     ///     In meters, as for `Observation`, in the size of the camera.
     /// seconds : float
-    ///     Time since the previous image, at most 10. Restart the tracker after a longer pause.
+    ///     Time since the previous image, not a time stamp: 0 for an image of the same instant, at
+    ///     most 10. Restart the tracker after a longer pause.
     /// mask : numpy.ndarray, shape (H, W), optional
     ///     Pixels to which the object is restricted. Not needed.
     /// scale : float, optional
@@ -136,15 +137,17 @@ impl PyTracker {
         &self,
         py: Python<'py>,
         depth: &Bound<'_, PyAny>,
-        seconds: f64,
+        seconds: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
         scale: Option<f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let expected = format!("the seconds since the previous image, 0 to {MAX_SECONDS}");
+        let seconds: f64 = seconds
+            .extract()
+            .map_err(|_| unexpected("seconds", seconds, &expected))?;
         if !(0.0..=MAX_SECONDS).contains(&seconds) {
-            return Err(InputError::new_err(format!(
-                "seconds is {seconds}, expected the seconds since the previous image, 0 to \
-                 {MAX_SECONDS}"
-            )));
+            let text = format!("seconds is {seconds}, expected {expected}");
+            return Err(InputError::new_err(text));
         }
         let depth = depth::shared(depth, scale)?;
         let mask = mask
@@ -160,7 +163,7 @@ impl PyTracker {
         });
         results::tracked(
             py,
-            &tracked.map_err(|error: ImageError| errors::input(error))?,
+            &tracked.map_err(|error: TrackError| errors::input(error))?,
         )
     }
 

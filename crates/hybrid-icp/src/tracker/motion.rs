@@ -10,6 +10,8 @@ const MAX: f64 = 1e3;
 const MIN_SECONDS: f64 = 1e-3;
 /// Information of a direction, relative to the best determined one, that is little.
 const WEAK: f64 = 0.01;
+/// Largest distance of the pose from a measured one, in standard deviations of the measurement.
+const MAX_DEVIATIONS: f64 = 4.0;
 
 /// A filter over the pose and the velocity of an object, in the camera frame.
 ///
@@ -95,20 +97,26 @@ impl Motion {
     }
 
     /// Combines the prediction with a measured pose of a covariance.
-    pub(super) fn update(&mut self, measured: &Isometry3<f64>, covariance: &Matrix6<f64>) {
+    ///
+    /// Returns `true` if the measurement does not contradict the result.
+    pub(super) fn update(&mut self, measured: &Isometry3<f64>, covariance: &Matrix6<f64>) -> bool {
         let Some(inverse) = inverse6(&(self.of_pose + covariance)) else {
-            return;
+            return false;
         };
-        let difference = difference(measured, &self.pose, &self.center);
+        let away = difference(measured, &self.pose, &self.center);
         let (of_pose, of_velocity) = (self.of_pose * inverse, self.of_both.transpose() * inverse);
-        self.apply(&(of_pose * difference));
-        self.velocity += of_velocity * difference;
+        self.apply(&(of_pose * away));
+        self.velocity += of_velocity * away;
         self.of_velocity -= of_velocity * self.of_both;
         self.of_both -= of_pose * self.of_both;
         self.of_pose -= of_pose * self.of_pose;
         for covariance in [&mut self.of_pose, &mut self.of_velocity] {
             *covariance = (*covariance + covariance.transpose()) * 0.5;
         }
+        let left = difference(measured, &self.pose, &self.center);
+        inverse6(covariance).is_some_and(|information| {
+            left.dot(&(information * left)) <= MAX_DEVIATIONS * MAX_DEVIATIONS
+        })
     }
 
     /// Moves the center and rotates the object around it.

@@ -1,7 +1,8 @@
 //! The parameters and the results of a tracker.
 
-use hicp_core::Isometry3;
+use hicp_core::{ImageError, Isometry3};
 use hicp_score::Evidence;
+use thiserror::Error;
 
 /// The parameters of a [`Tracker`](crate::Tracker).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +28,21 @@ impl Default for TrackerConfig {
             coast_seconds: 0.1,
         }
     }
+}
+
+/// The reason why [`Tracker::step`](crate::Tracker::step) refuses an image.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum TrackError {
+    /// The sizes of the image, the mask and the camera differ.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The time is negative or not finite.
+    #[error("seconds is {found}, expected the seconds since the previous image, 0 or more")]
+    Seconds {
+        /// The time given.
+        found: f64,
+    },
 }
 
 /// The degree of trust in the pose of a [`Tracked`].
@@ -64,6 +80,9 @@ pub struct Tracked {
     /// The degree of trust in the pose.
     pub state: TrackState,
     /// The evidence for and against the pose.
+    ///
+    /// It is measured at the registered pose. The filter moves that by at most four standard
+    /// deviations of the registration.
     pub evidence: Evidence,
     /// Standard deviation of the least determined displacement of the object, meters.
     ///

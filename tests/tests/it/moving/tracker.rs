@@ -7,11 +7,11 @@ use hicp_sim::{DepthSensor, Hand, Household, MovingConfig, MovingScene, stream};
 use hicp_tests::tabletop::Tabletop;
 use hicp_tests::ycbv;
 use hybrid_icp::core::{
-    DepthImage, Isometry3, Mask, Model, PinholeCamera, Point3, Translation3, TriMesh,
+    DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Translation3, TriMesh,
     UnitQuaternion, Vector3, se3,
 };
 use hybrid_icp::score::{ModelPoints, mssd};
-use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
+use hybrid_icp::{Preset, Refiner, TrackState, Tracked, Tracker, TrackerConfig};
 
 const SECONDS: f64 = 1.0 / 30.0;
 
@@ -49,11 +49,16 @@ fn sequence(object: Household, hand: Hand, frames: usize) -> Sequence {
 
 impl Sequence {
     fn track(&self) -> Vec<Tracked> {
+        self.track_every(SECONDS)
+    }
+
+    /// Tracks the object with a time between two images, which may be wrong.
+    fn track_every(&self, seconds: f64) -> Vec<Tracked> {
         let mut tracker = Tracker::new(self.model.clone(), camera(), TrackerConfig::default());
         tracker.start(&self.scene.poses[0]);
         let depths = self.depths.iter();
         depths
-            .map(|depth| tracker.step(depth, SECONDS, None).unwrap())
+            .map(|depth| tracker.step(depth, seconds, None).unwrap())
             .collect()
     }
 
@@ -81,6 +86,41 @@ fn a_moving_object_is_tracked_without_masks() {
     let moved = (poses[39] * center - poses[0] * center).norm();
     assert!(moved > 0.04, "{moved}");
     assert_eq!(tracked, sequence.track());
+}
+
+/// Duplicate time stamps, or a wrong unit: a filter of constant velocity lags behind the object.
+#[test]
+fn the_evidence_belongs_to_the_pose_even_if_the_time_is_wrong() {
+    let sequence = sequence(Household::Teapot, Hand::Absent, 20);
+    let mut refiner = Refiner::preset(Preset::Hybrid);
+    for seconds in [0.0, 1e-4, 1e-3, 0.1 * SECONDS, 10.0 * SECONDS] {
+        for (frame, tracked) in sequence.track_every(seconds).iter().enumerate() {
+            let (shift, angle) = sequence.errors(frame, tracked);
+            let pose = &tracked.camera_from_object;
+            let (_, silhouette) = hicp_tests::render(&sequence.model, &camera(), pose);
+            let depth = Arc::clone(&sequence.depths[frame]);
+            let observation = Observation::new(depth, silhouette, camera()).unwrap();
+            let confidence = refiner
+                .judge(&sequence.model, &observation, pose)
+                .confidence;
+            let place = format!("{seconds} s, frame {frame}: {shift} d, {angle}°, {confidence}");
+            assert_eq!(tracked.state, TrackState::Tracking, "{place}");
+            assert!(shift < 0.03 && angle < 10.0 && confidence > 0.8, "{place}");
+        }
+    }
+}
+
+#[test]
+fn times_before_the_previous_image_are_refused() {
+    let sequence = sequence(Household::Teapot, Hand::Absent, 1);
+    let mut tracker = Tracker::new(sequence.model, camera(), TrackerConfig::default());
+    for seconds in [-SECONDS, f64::NAN, f64::INFINITY] {
+        let error = tracker
+            .step(&sequence.depths[0], seconds, None)
+            .unwrap_err();
+        let text = format!("seconds is {seconds}, expected the seconds since the previous image");
+        assert!(error.to_string().starts_with(&text), "{error}");
+    }
 }
 
 #[test]
@@ -169,10 +209,12 @@ fn images_without_the_object_and_starts_that_are_not_finite_are_never_tracked() 
         (Isometry3::translation(1e9, 0.0, 1e9), &wall, None),
         (Isometry3::translation(f64::NAN, 0.0, 0.7), &wall, None),
     ] {
-        for seconds in [SECONDS, 0.0, 1e9, -1.0, f64::NAN] {
+        for value in [SECONDS, 0.0, 1e9, -1.0, f64::NAN] {
+            // The times that `step` accepts.
+            let seconds = if value >= 0.0 { value } else { SECONDS };
             let config = TrackerConfig {
-                meters_per_second: seconds,
-                memory_seconds: seconds,
+                meters_per_second: value,
+                memory_seconds: value,
                 ..TrackerConfig::default()
             };
             for config in [config, TrackerConfig::default()] {
@@ -180,7 +222,7 @@ fn images_without_the_object_and_starts_that_are_not_finite_are_never_tracked() 
                 tracker.start(&start);
                 for _ in 0..4 {
                     let tracked = tracker.step(depth, seconds, mask).unwrap();
-                    assert_ne!(tracked.state, TrackState::Tracking, "{start:?} {seconds}");
+                    assert_ne!(tracked.state, TrackState::Tracking, "{start:?} {value}");
                     assert!(se3::is_finite(&tracked.camera_from_object));
                 }
             }

@@ -89,6 +89,21 @@ fn a_start_far_from_the_object_is_warned_of() {
     ]);
 }
 
+/// If the time between two images is wrong, a filter lags behind the object.
+#[test]
+fn the_pose_does_not_lag_behind_if_the_rate_is_wrong() {
+    let folder = moving(8);
+    let told = folder.command(format!("{TRACK} --fps 300000"));
+    told.warns(&["--fps is 300000, expected the number of images per second, at most 1000"]);
+    let dataset = Dataset::open(folder.path("set")).unwrap();
+    let scene = dataset.scene("test", 1).unwrap();
+    for (image, line) in (0..).zip(folder.json_lines("out.jsonl")) {
+        let truth = scene.ground_truth(image).unwrap()[0].camera_from_object;
+        let (_, distance) = se3::pose_distance(&pose_of(&line), &truth);
+        assert!(distance < 0.003, "{image}: {distance}");
+    }
+}
+
 #[test]
 fn wrong_inputs_of_tracking_are_refused() {
     let folder = moving(2);
