@@ -215,6 +215,7 @@ pub(crate) fn sequential_step<'py>(py: Python<'py>, step: &SequentialStep) -> Re
                 SequentialEvent::Refused(_) => "refused",
                 _ => "other",
             },
+            reason: step.event.reason(),
         }
     )
 }

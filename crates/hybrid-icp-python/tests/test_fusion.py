@@ -87,6 +87,32 @@ def test_the_sequential_estimator_warns_of_a_wrong_motion(scene):
             steps.append(estimator.step(observation, np.linalg.inv(motion) if steps else None))
             true = motion @ true
     assert [step.event for step in steps] == ["accepted", "rejected", "rejected", "restarted"]
+    assert steps[0].reason is None and "Mahalanobis" in steps[1].reason
+
+
+def test_the_sequential_estimator_warns_of_images_that_show_the_object_elsewhere(scene):
+    """The object is so far off that nothing is paired, and the fuser never starts again."""
+
+    def events(depths):
+        arguments = hi.Pipeline("hybrid"), "weighted-average", scene.model, scene.rough
+        estimator = hi.SequentialEstimator(*arguments)
+        for depth in depths:
+            step = estimator.step(hi.Observation(depth, depth > 0, scene.camera))
+            yield step.event, step.reason
+
+    def rendered(z):
+        true = pose([0, 0, 0], [0, 0, z]) @ scene.true
+        return hi.render_depth(scene.model, scene.camera, true)
+
+    there, elsewhere = rendered(0.0), rendered(2.0)
+    with pytest.warns(hi.InputWarning, match="as were accepted, or more, contradict .* T_nc") as w:
+        found = list(events([there, elsewhere, elsewhere, elsewhere]))
+    assert len(w) == 1
+    assert found[0] == ("accepted", None)
+    assert all(event == "no_estimate" and reason for event, reason in found[1:])
+    # An image without the object contradicts nothing.
+    nothing = np.zeros_like(there)
+    assert [event for event, _ in events([there, nothing, nothing])][1:] == ["no_estimate"] * 2
 
 
 def test_a_calibrated_covariance_is_at_least_the_error_of_models(scene):

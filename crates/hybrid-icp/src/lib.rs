@@ -115,7 +115,9 @@ pub use mask_in_box::mask_in_box;
 pub use preset::Preset;
 pub use refiner::{Refinement, Refiner};
 pub use sequential::SequentialEstimator;
-pub use sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs};
+pub use sequential_step::{
+    MotionCheck, SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs,
+};
 pub use trace::{StageRecord, Trace};
 pub use tracker::{TrackError, TrackState, Tracked, Tracker, TrackerConfig};
 pub use warning::{CenterFault, Warning};

@@ -63,6 +63,56 @@ pub enum SequentialEvent {
     Refused(FusionError),
 }
 
+impl SequentialEvent {
+    /// Returns the reason why the estimate was not accepted, or `None` if it was.
+    #[must_use]
+    pub fn reason(&self) -> Option<String> {
+        match self {
+            Self::Estimated(update) => update.failure().map(ToString::to_string),
+            Self::NoEstimate(termination) => Some(termination.explain().to_owned()),
+            Self::Refused(error) => Some(error.to_string()),
+        }
+    }
+}
+
+/// Counts the images that contradict the motion of the camera, which has no other check.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MotionCheck {
+    accepted: usize,
+    contradicting: usize,
+}
+
+impl MotionCheck {
+    /// Counts an image that was registered.
+    pub fn add(&mut self, event: &SequentialEvent) {
+        match event {
+            SequentialEvent::Estimated(Update::Accepted(_)) => self.accepted += 1,
+            SequentialEvent::Estimated(Update::Rejected(_) | Update::Restarted(..)) => self.miss(),
+            _ => {}
+        }
+    }
+
+    /// Counts an image that shows the object, but not at the pose that moved with the camera.
+    ///
+    /// It counts only after an accepted image: before, the initial pose may be wrong.
+    pub fn miss(&mut self) {
+        self.contradicting += usize::from(self.accepted > 0);
+    }
+
+    /// Returns the number of accepted images.
+    #[must_use]
+    pub fn accepted(&self) -> usize {
+        self.accepted
+    }
+
+    /// Returns the number of contradicting images if they are as many as the accepted ones.
+    #[must_use]
+    pub fn contradicting(&self) -> Option<usize> {
+        let contradicting = Some(self.contradicting);
+        contradicting.filter(|count| self.accepted > 0 && *count >= self.accepted)
+    }
+}
+
 /// The object's pose after one image, and how it was found.
 ///
 /// Poses and covariances are in the camera frame of that image.

@@ -1047,7 +1047,8 @@ class SequentialEstimator:
         images and is not calibrated, so do not use it as an error. "calibrated" is about as wide as
         the errors: the covariance of the registration, with factors that were fitted to "hybrid"
         and to models reconstructed from images. It also rejects estimates with an MVE above 0.25,
-        and those that are far from the fused pose. It excludes `paper`.
+        and those that are far from the fused pose. It excludes `paper`. `bop sequence` names them
+        `--uncertainty mve` and `--uncertainty registration`, and the latter is its default.
     """
 
     def __new__(cls, pipeline: Pipeline, method: str, model: Model, T_co: npt.ArrayLike, *, paper: bool=False, covariance: Literal['mve', 'calibrated']='mve') -> SequentialEstimator:
@@ -1072,8 +1073,9 @@ class SequentialEstimator:
         Warns
         -----
         InputWarning
-            As for `Pipeline.refine`, while there is no estimate. If the event is "restarted",
-            because the images contradict `T_nc`.
+            As for `Pipeline.refine`, while there is no estimate. If the images contradict `T_nc`:
+            the event is "restarted", or two or more images, and as many as were accepted, do not
+            show the object at the pose that moved with the camera.
         """
 
     def move_camera(self, T_nc: npt.ArrayLike, covariance: npt.ArrayLike | None=None) -> None:

@@ -462,6 +462,9 @@ class SequentialStep(_Record):
         The mean VSD estimate of `T_registered`; None if it was not scored.
     event : str
         The result of `Fuser.update`, or "no_estimate" or "refused".
+    reason : str or None
+        The reason why the estimate was not accepted, for example the limit that it exceeds; None if
+        it was.
     """
 
     T_co: _Array
@@ -471,6 +474,7 @@ class SequentialStep(_Record):
     termination: str
     mve: float | None
     event: str
+    reason: str | None
 
     def __repr__(self) -> str:
         return f"SequentialStep({self.event}, t = {_translation(self.T_co)} m)"

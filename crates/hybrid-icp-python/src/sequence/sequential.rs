@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 
 use hybrid_icp::fusion::{FusionMethod, Update};
-use hybrid_icp::{Calibration, SequentialEstimator, SequentialEvent};
+use hybrid_icp::{Calibration, MotionCheck, SequentialEstimator, SequentialEvent};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, Motion};
@@ -38,10 +38,12 @@ use crate::sequence::fusion::{self, PyPoseEstimate};
 ///     images and is not calibrated, so do not use it as an error. "calibrated" is about as wide as
 ///     the errors: the covariance of the registration, with factors that were fitted to "hybrid"
 ///     and to models reconstructed from images. It also rejects estimates with an MVE above 0.25,
-///     and those that are far from the fused pose. It excludes `paper`.
+///     and those that are far from the fused pose. It excludes `paper`. `bop sequence` names them
+///     `--uncertainty mve` and `--uncertainty registration`, and the latter is its default.
 #[pyclass(frozen, module = "hybrid_icp", name = "SequentialEstimator")]
 pub(crate) struct PySequentialEstimator {
     estimator: Mutex<SequentialEstimator>,
+    check: Mutex<MotionCheck>,
     pipeline: Py<PyPipeline>,
     method: FusionMethod,
     model: Py<PyModel>,
@@ -81,6 +83,7 @@ impl PySequentialEstimator {
         };
         Ok(Self {
             estimator: Mutex::new(estimator.map_err(errors::input)?),
+            check: Mutex::default(),
             pipeline: pipeline.clone().unbind(),
             method,
             model: model.clone().unbind(),
@@ -105,8 +108,9 @@ impl PySequentialEstimator {
     /// Warns
     /// -----
     /// InputWarning
-    ///     As for `Pipeline.refine`, while there is no estimate. If the event is "restarted",
-    ///     because the images contradict `T_nc`.
+    ///     As for `Pipeline.refine`, while there is no estimate. If the images contradict `T_nc`:
+    ///     the event is "restarted", or two or more images, and as many as were accepted, do not
+    ///     show the object at the pose that moved with the camera.
     #[pyo3(signature = (observation, T_nc = None, covariance = None))]
     fn step<'py>(
         &self,
@@ -130,11 +134,31 @@ impl PySequentialEstimator {
         let (model, observation) = (&model.model, &observation.observation);
         // Release the GIL first: another thread may hold the lock for a whole step.
         let step = py.detach(|| locked(&self.estimator).step(model, observation, &motion));
-        if let SequentialEvent::Estimated(Update::Restarted(..)) = step.event {
-            let text = "the fuser started again, because the last images contradict the pose that \
-                        moved with the camera: check that T_nc is the next camera from the camera, \
-                        in meters, and that the object stands still";
-            errors::warn(py, text)?;
+        let mut check = locked(&self.check);
+        let before = *check;
+        match step.event {
+            SequentialEvent::NoEstimate(_) if observation.n_measured() > 0 => check.miss(),
+            _ => check.add(&step.event),
+        }
+        let after = *check;
+        drop(check);
+        // The object may be hidden in one image.
+        let is_contradicted = |check: MotionCheck| check.contradicting().is_some_and(|n| n > 1);
+        let restarted = matches!(
+            step.event,
+            SequentialEvent::Estimated(Update::Restarted(..))
+        );
+        if restarted || (is_contradicted(after) && !is_contradicted(before)) {
+            let start = if restarted {
+                "the fuser started again, because the last images"
+            } else {
+                "as many images as were accepted, or more,"
+            };
+            let text = format!(
+                "{start} contradict the pose that moved with the camera: check that T_nc is \
+                 the next camera from the camera, in meters, and that the object stands still"
+            );
+            errors::warn(py, &text)?;
         }
         results::sequential_step(py, &step)
     }
@@ -168,7 +192,9 @@ impl PySequentialEstimator {
     fn restart(&self, py: Python<'_>, T_co: &Bound<'_, PyAny>) -> PyResult<()> {
         let init = array::motion(T_co, "T_co")?.isometry;
         py.detach(|| locked(&self.estimator).restart(&init))
-            .map_err(errors::input)
+            .map_err(errors::input)?;
+        *locked(&self.check) = MotionCheck::default();
+        Ok(())
     }
 
     /// The fused pose in the current camera frame, shape (4, 4), float64, meters; the initial pose

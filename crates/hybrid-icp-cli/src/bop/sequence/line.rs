@@ -8,9 +8,6 @@ use serde_json::{Value, json};
 
 use crate::pose_json::add_pose;
 
-/// The description of an image in which the model overlaps no mask of the object.
-pub(super) const NO_OVERLAP: &str = "moved with the camera: no overlap with a mask of the object";
-
 /// An image of the sequence.
 #[derive(Clone, Debug)]
 pub(super) struct Line {
@@ -61,7 +58,7 @@ impl Line {
         step: SequentialStep,
         confidence: f64,
     ) -> Self {
-        let (outcome, description, reason) = describe(&step.event);
+        let (outcome, description) = describe(&step.event);
         Self {
             im_id,
             instance,
@@ -71,14 +68,9 @@ impl Line {
             single: Some((step.outcome, step.mve)),
             outcome,
             description,
-            reason,
+            reason: step.event.reason(),
             off: None,
         }
-    }
-
-    /// Returns `true` if the object was elsewhere than the motion of the camera says.
-    pub(super) fn contradicts(&self) -> bool {
-        matches!(self.outcome, "rejected" | "restarted") || self.description == NO_OVERLAP
     }
 
     /// Returns the line of JSON.
@@ -110,8 +102,8 @@ impl Line {
     }
 }
 
-/// Returns the name of an event, a description for people, and the reason of a failure.
-fn describe(event: &SequentialEvent) -> (&'static str, &'static str, Option<String>) {
+/// Returns the name of an event, and a description for people.
+fn describe(event: &SequentialEvent) -> (&'static str, &'static str) {
     match event {
         SequentialEvent::Estimated(update) => {
             let description = match update {
@@ -120,21 +112,10 @@ fn describe(event: &SequentialEvent) -> (&'static str, &'static str, Option<Stri
                 Update::Restarted(..) => "started again: contradicted the fused pose",
                 _ => update.name(),
             };
-            let reason = update.failure().map(ToString::to_string);
-            (update.name(), description, reason)
+            (update.name(), description)
         }
-        SequentialEvent::Refused(error) => {
-            let description = "refused: no pose or no covariance";
-            ("refused", description, Some(error.to_string()))
-        }
-        SequentialEvent::NoEstimate(termination) => {
-            let reason = termination.explain().to_owned();
-            (
-                "no-estimate",
-                "no estimate: nothing to register",
-                Some(reason),
-            )
-        }
-        _ => ("no-estimate", "no estimate", None),
+        SequentialEvent::Refused(_) => ("refused", "refused: no pose or no covariance"),
+        SequentialEvent::NoEstimate(_) => ("no-estimate", "no estimate: nothing to register"),
+        _ => ("no-estimate", "no estimate"),
     }
 }

@@ -72,9 +72,11 @@ fn follows(pipeline: Arg) -> Arg {
 /// The source of an estimate's covariance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Uncertainty {
-    /// The calibrated covariance of the registration, with a gate on the Mahalanobis distance.
+    /// The calibrated covariance of the registration, with a gate on the Mahalanobis distance (in
+    /// Python `covariance="calibrated"`).
     Registration,
-    /// The MVE alone, as in the paper, around the object's center.
+    /// The MVE alone, as in the paper, around the object's center (`covariance="mve"`, the default
+    /// in Python).
     Mve,
 }
 
@@ -155,18 +157,27 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             ));
         }
     }
-    let accepted = lines.iter().filter(|line| line.outcome == "accepted");
-    let since = lines.iter().skip_while(|line| line.outcome != "accepted");
-    let against = since.filter(|line| line.contradicts()).count();
-    match accepted.count() {
-        0 => follow.distrust(lines.len(), "an estimate is accepted"),
-        accepted if against >= accepted => warn(format_args!(
+    if let Some(against) = tracker.check.contradicting() {
+        warn(format_args!(
             "{output}: {against} of {} contradict the pose that moved with the camera: check \
              cam_R_w2c and cam_t_w2c (camera from world, mm) in {}, and that the object stands still",
             counted(lines.len(), "image"),
             scene.file("scene_camera").display()
-        )),
-        _ => {}
+        ));
+    } else if tracker.unmasked == lines.len() {
+        let of_object = format!("scene_id {scene_id} and category_id {object} for its images");
+        warn(format_args!(
+            "{output}: none of its {} images has a mask of the object: do not trust its poses, and \
+             check that {}",
+            lines.len(),
+            match &arguments.detections {
+                Some(path) => format!("{} has detections with {of_object}", path.display()),
+                None =>
+                    format!("the masks of object {object} in mask_visib exist and are not empty"),
+            }
+        ));
+    } else if tracker.check.accepted() == 0 {
+        follow.distrust(lines.len(), "an estimate is accepted");
     }
     if let Some(damaged) = faults::report(tracker.faults.iter(), [].iter()) {
         bail!("{damaged}; {output} has no estimate for their images");

@@ -3,9 +3,9 @@
 use hicp_bop::{Fault, MaskSource, RowStatus, Scenes};
 use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::fusion::CameraMotion;
-use hybrid_icp::{Preset, Refiner, SequentialEstimator, Warning, warnings};
+use hybrid_icp::{MotionCheck, Preset, Refiner, SequentialEstimator, Warning, warnings};
 
-use super::line::{Line, NO_OVERLAP};
+use super::line::Line;
 
 /// Feeds the images of a scene to an estimator.
 pub(super) struct Tracker<'a> {
@@ -17,6 +17,9 @@ pub(super) struct Tracker<'a> {
     estimator: SequentialEstimator,
     /// Renders the model to select a mask, and judges the fused pose.
     refiner: Refiner,
+    pub(super) check: MotionCheck,
+    /// The number of images without a mask of the object.
+    pub(super) unmasked: usize,
     /// Files that were missing or damaged.
     pub(super) faults: Vec<Fault>,
     /// Warnings about the first registered image; the other images have the same units and scales.
@@ -39,6 +42,8 @@ impl<'a> Tracker<'a> {
             masks,
             estimator,
             refiner: Refiner::preset(Preset::Hybrid),
+            check: MotionCheck::default(),
+            unmasked: 0,
             faults: Vec::new(),
             warnings: None,
         }
@@ -50,8 +55,14 @@ impl<'a> Tracker<'a> {
         self.register(im_id, motion, &predicted)
             .unwrap_or_else(|status| {
                 let why = match status {
-                    RowStatus::NoMask => "moved with the camera: no mask of the object",
-                    RowStatus::NoOverlap => NO_OVERLAP,
+                    RowStatus::NoMask => {
+                        self.unmasked += 1;
+                        "moved with the camera: no mask of the object"
+                    }
+                    RowStatus::NoOverlap => {
+                        self.check.miss();
+                        "moved with the camera: no overlap with a mask of the object"
+                    }
                     RowStatus::MissingFrame => "moved with the camera: no depth image",
                     _ => "moved with the camera: damaged file",
                 };
@@ -86,6 +97,7 @@ impl<'a> Tracker<'a> {
             self.warnings
                 .get_or_insert_with(|| (im_id, warnings(model, observation, predicted)));
             let step = self.estimator.step(model, observation, motion);
+            self.check.add(&step.event);
             let fused = step.camera_from_object;
             let confidence = self.refiner.judge(model, observation, &fused).confidence;
             // The visible masks are those of the instances, in their order.

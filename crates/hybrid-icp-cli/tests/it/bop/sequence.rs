@@ -115,11 +115,22 @@ fn detections_replace_the_ground_truth() {
             }));
         }
     }
-    let text = Value::from(detections).to_string();
+    let text = Value::from(detections.clone()).to_string();
     folder.write("found.json", text);
     folder.remove("set/test/000001/scene_gt.json");
     let refused = sequence(&folder, INITIAL, "").exits(1);
     refused.complains(&["scene_gt.json does not exist", "--detections"]);
+    // Detections of another scene are the cause, not the initial pose.
+    let text = Value::from(detections).to_string();
+    folder.write(
+        "other.json",
+        text.replace("\"scene_id\":1", "\"scene_id\":2"),
+    );
+    let told = sequence(&folder, INITIAL, "--detections other.json").exits(0);
+    let none = "warning: out.jsonl: none of its 7 images has a mask of the object: do not trust its \
+                poses, and check that other.json has detections with scene_id 1 and category_id 1 for \
+                its images\n";
+    assert_eq!(told.err, none);
     sequence(&folder, INITIAL, "--detections found.json").exits(0);
     for (line, expected) in lines(&folder).iter().zip(&expected) {
         for key in ["cam_t_m2c", "covariance", "confidence", "single"] {
