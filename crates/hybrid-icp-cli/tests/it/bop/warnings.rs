@@ -75,7 +75,12 @@ fn objects_that_models_info_does_not_describe_are_named_once() {
         let wanted = format!(
             "warning: ./models/models_info.json {fault}: no symmetries are declared, and diameters are those of the meshes\n"
         );
-        assert_eq!([refine, eval], [wanted.clone(), wanted]);
+        assert_eq!(refine, wanted);
+        // The first warning of the evaluation is about the absent targets.
+        assert!(
+            eval.ends_with(&wanted) && eval.lines().count() == 2,
+            "{eval}"
+        );
     }
 }
 
