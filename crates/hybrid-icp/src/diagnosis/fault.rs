@@ -179,9 +179,14 @@ impl Fault {
                 (fault, format!("use fx {fx}, fy {fy}, cx {cx}, cy {cy}"))
             }
             Self::FocalLength { factor } => {
-                let (fault, _) = scale("the focal length of the camera", factor);
-                let fix = "use the intrinsics of the camera that took the depth image".to_owned();
-                (format!("{fault}, about"), fix)
+                let (times, size) = match factor < 1.0 {
+                    true => (1.0 / factor, "large"),
+                    false => (factor, "small"),
+                };
+                let fault =
+                    format!("the focal length of the camera is about {times:.2} times too {size}");
+                let fix = "use the intrinsics of the camera that took the depth image";
+                (fault, fix.to_owned())
             }
             Self::RayDistance => texts(
                 "the depth image has distances along the ray instead of depths",

@@ -6,7 +6,6 @@ use crate::common::*;
 use hicp_io::LengthUnit;
 use hicp_io::bop::{read_results, write_results};
 use hybrid_icp::core::{DepthImage, Isometry3, Point3, TriMesh};
-use serde_json::json;
 
 /// The depth scale in the camera files.
 const SCALE: &str = "\"depth_scale\":0.1";

@@ -163,6 +163,14 @@ fn wrong_masks_and_images_are_named() {
         json!({"fx": doubled("fx"), "fy": doubled("fy"), "cx": doubled("cx"), "cy": doubled("cy")});
     scene.write("camera.json", camera.to_string());
     names(&scene, "intrinsics", None);
+    // Those of another camera with images of this size.
+    for factor in [1.2, 1.4] {
+        scene.write("camera.json", FLAT_CAMERA);
+        scene.change_json("camera.json", |camera| {
+            (camera["fx"], camera["fy"]) = (json!(400.0 * factor), json!(402.0 * factor));
+        });
+        names(&scene, "focal_length", None);
+    }
 
     let scene = Scene::new()
         .with("--depth-camera", "camera.json")
