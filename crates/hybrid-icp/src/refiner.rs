@@ -242,8 +242,8 @@ impl<S: Stage> Refiner<S> {
 
     /// Judges a pose as it is, for example a fused one or that of another library.
     ///
-    /// It is its own initial pose. The outcome states that it was kept. Cost: one render, and the
-    /// scores of a refinement.
+    /// It is its own initial pose. The outcome states that it was kept. Cost: one render,
+    /// the scores of a refinement, and the pairs at the pose.
     pub fn judge(
         &mut self,
         model: &Model,

@@ -24,6 +24,16 @@ fn mug() -> Model {
     Household::Mug.model().unwrap()
 }
 
+/// Registers two clouds without an initial pose.
+fn aligned(kind: Registration, source: &Cloud, target: &Cloud) -> Alignment {
+    align(
+        source,
+        target,
+        &Isometry3::identity(),
+        &mut *kind.build(None),
+    )
+}
+
 /// Returns points of the mug's surface without normals.
 fn points(count: usize) -> Vec<Point3<f32>> {
     let surfels = sample_surface(mug().mesh(), count);
@@ -183,12 +193,7 @@ fn spheres_have_no_covariance() {
     };
     let (source, target) = (sphere(1), sphere(2));
     for kind in [Registration::PointToPlane, Registration::Generalized] {
-        let found = align(
-            &source,
-            &target,
-            &Isometry3::identity(),
-            &mut *kind.build(None),
-        );
+        let found = aligned(kind, &source, &target);
         assert!(found.covariance().is_none(), "{kind:?}");
         // Rotations around every axis.
         assert!(matches!(open(&found), Some((3.., None))), "{found:?}");
@@ -242,12 +247,7 @@ fn noise_does_not_determine_a_rotation() {
         let [source, target] = [(12_000, 0.0), (13_000, 1.0)]
             .map(|(n, azimuth)| cloud(&view(object, n, azimuth, 1e-3)));
         for kind in [Registration::PointToPlane, Registration::Generalized] {
-            let found = align(
-                &source,
-                &target,
-                &Isometry3::identity(),
-                &mut *kind.build(None),
-            );
+            let found = aligned(kind, &source, &target);
             let pairs = found.outcome.quality.unwrap().observability().unwrap();
             assert!(pairs.eigenvalues[0] > 0.01, "{object:?} {kind:?} {pairs:?}");
             assert_eq!(found.covariance().is_none(), is_open, "{object:?} {kind:?}");
