@@ -19,6 +19,7 @@ mod align;
 mod array;
 mod batch;
 mod bop;
+mod diagnosis;
 mod errors;
 mod input;
 mod mutex;
@@ -40,6 +41,8 @@ mod native {
     use crate::align::{align, read_cloud};
     #[pymodule_export]
     use crate::bop::{PyDatasetRefiner, read_images, result_header};
+    #[pymodule_export]
+    use crate::diagnosis::diagnose;
     #[pymodule_export]
     use crate::input::camera::PyCamera;
     #[pymodule_export]

@@ -5,7 +5,10 @@ use std::collections::BTreeMap;
 use hybrid_icp::icp::{
     Alternative, DecisionEvent, IterationEvent, Outcome, Quality, RegimeEvent, StageEvent, Verdict,
 };
-use hybrid_icp::{Alignment, Refinement, SequentialEvent, SequentialStep, StageRecord, Tracked};
+use hybrid_icp::{
+    Alignment, Diagnosis, Finding, Refinement, SequentialEvent, SequentialStep, StageRecord,
+    Tracked,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -181,6 +184,34 @@ pub(crate) fn alignment<'py>(
             rmse: alignment.rmse(),
             covariance: alignment.covariance().as_ref().map(Matrix::from),
             warnings: warnings,
+        }
+    )
+}
+
+/// Returns a finding as a `Fault`.
+fn fault<'py>(py: Python<'py>, finding: &Finding) -> Record<'py> {
+    let text = serde_json::to_string(&finding.fault)
+        .unwrap_or_else(|error| unreachable!("a fault is plain JSON: {error}"));
+    let numbers = py.import("json")?.call_method1("loads", (text,))?;
+    record!(
+        py,
+        Fault {
+            fault: numbers.call_method1("pop", ("fault",))?,
+            problem: finding.fault.to_string(),
+            fix: finding.fault.fix(),
+            score: finding.score,
+            numbers: numbers,
+        }
+    )
+}
+
+pub(crate) fn diagnosis<'py>(py: Python<'py>, diagnosis: &Diagnosis) -> Record<'py> {
+    let faults: PyResult<Vec<_>> = (diagnosis.findings.iter().map(|f| fault(py, f))).collect();
+    record!(
+        py,
+        Diagnosis {
+            faults: faults?,
+            score: diagnosis.score,
         }
     )
 }

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, Protocol, TypedDict, Union, final
 import numpy as np
 import numpy.typing as npt
-from ._results import Alignment, DecisionEvent, IterationEvent, RegimeEvent, Result, SequentialStep, StageEvent, Tracked
-__all__ = ['Camera', 'DatasetRefiner', 'DepthImage', 'Fuser', 'Model', 'Observation', 'Pipeline', 'PoseEstimate', 'SequentialEstimator', 'Tracker', 'add', 'adi', 'align', 'fuse', 'mask_in_box', 'mspd', 'mssd', 'mve', 'parts', 'point_to_plane_step', 'point_to_point_step', 'read_cloud', 'read_depth', 'read_depth_png', 'read_images', 'read_mask', 'read_mask_png', 'read_pose', 'render_depth', 'result_header', 'run_program', 'vsd']
+from ._results import Alignment, DecisionEvent, Diagnosis, IterationEvent, RegimeEvent, Result, SequentialStep, StageEvent, Tracked
+__all__ = ['Camera', 'DatasetRefiner', 'DepthImage', 'Fuser', 'Model', 'Observation', 'Pipeline', 'PoseEstimate', 'SequentialEstimator', 'Tracker', 'add', 'adi', 'align', 'diagnose', 'fuse', 'mask_in_box', 'mspd', 'mssd', 'mve', 'parts', 'point_to_plane_step', 'point_to_point_step', 'read_cloud', 'read_depth', 'read_depth_png', 'read_images', 'read_mask', 'read_mask_png', 'read_pose', 'render_depth', 'result_header', 'run_program', 'vsd']
 _Array = npt.NDArray[np.float64]
 _Unit = Literal['m', 'mm', 'cm']
 _Axes = Union[npt.ArrayLike, Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]]
@@ -1308,6 +1308,54 @@ def vsd(model: Model, observation: Observation, T_est: npt.ArrayLike, T_gt: npt.
     -------
     numpy.ndarray, shape (10,), float64
         e_VSD for τ = 5 %, 10 %, …, 50 % of the diameter; 1 if neither render has a visible pixel.
+    """
+
+def diagnose(model: Model, observation: Observation, T_co: npt.ArrayLike) -> Diagnosis:
+    """Names what is wrong with the inputs of `Pipeline.refine`, and the fix.
+
+    Each fault that inputs can have is corrected on trial, and a short refinement scores the
+    corrected inputs. A fault is named if its correction improves the score clearly. The initial
+    pose may be off by some millimeters and degrees, as those of detectors are. Two faults at once
+    are often not found: correct one, and diagnose again. Like `hybrid-icp doctor`, but without the
+    faults of files, such as a label image as the mask.
+
+    It takes about as long as 10 refinements, and releases the GIL.
+
+    Parameters
+    ----------
+    model : Model
+        The object.
+    observation : Observation
+        The image. Its mask shows the object alone: in a box, other objects hide the fault.
+    T_co : array_like, shape (4, 4)
+        The initial pose, camera from object, meters. Any length of its translation is accepted.
+
+    Returns
+    -------
+    Diagnosis
+        The faults, the most probable one first.
+
+    Raises
+    ------
+    InputError
+        If the pose is not a rigid motion.
+
+    Examples
+    --------
+    A plate is 0.5 m in front of the camera, but its depth was read at ten times its scale:
+
+    >>> import numpy as np
+    >>> from hybrid_icp import Camera, Model, Observation, diagnose, render_depth
+    >>> corners = [[-.1, -.1, 0], [.1, -.1, 0], [.1, .1, 0], [-.1, .1, 0]]
+    >>> model = Model(corners, [[0, 2, 1], [0, 3, 2]])
+    >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
+    >>> true = np.eye(4); true[2, 3] = 0.5
+    >>> depth = render_depth(model, camera, true)
+    >>> observation = Observation(10 * depth, depth > 0, camera)
+    >>> rough = np.eye(4); rough[2, 3] = 0.503
+    >>> diagnosis = diagnose(model, observation, rough)
+    >>> diagnosis.faults[0]["problem"], diagnosis.faults[0]["fix"]
+    ('the depth is 10 times too large', 'multiply the depth by 0.1')
     """
 
 def mve(model: Model, observation: Observation, T_co: npt.ArrayLike, *, occlusion_tolerance: float | None=..., imperfect_mask: bool=...) -> float:

@@ -441,6 +441,54 @@ class Alignment(_Record):
         return f"Alignment({self.outcome}, {self.termination}, fitness {self.fitness:.3f})"
 
 
+class Fault(TypedDict):
+    """A fault of the inputs of a refinement, and the evidence for it.
+
+    - `fault`: its name, such as "mesh_scale".
+    - `problem`, `fix`: the fault and the correction in words.
+    - `score`: the score of the corrected inputs, to compare with that of the `Diagnosis`; None if
+      the fault is a fact that needs no comparison.
+    - `numbers`: the numbers of the fault by name, such as {"factor": 0.001}.
+    """
+
+    fault: str
+    problem: str
+    fix: str
+    score: float | None
+    numbers: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(_Record):
+    """The probable faults of the inputs of a refinement, from `diagnose`.
+
+    `print` shows them with their fixes.
+
+    Attributes
+    ----------
+    faults : list of Fault
+        The most probable one first; empty if none is probable.
+    score : float
+        The score of the inputs as they are: 0 is perfect, 1 the worst.
+    """
+
+    faults: list[Fault]
+    score: float
+
+    def __str__(self) -> str:
+        if not self.faults:
+            return f"no fault found (score {self.score:.3f})"
+        ranks = ["fault"] + ["less probable"] * (len(self.faults) - 1)
+        lines = (
+            f"{rank}: {fault['problem']}\n  fix: {fault['fix']}"
+            for rank, fault in zip(ranks, self.faults)
+        )
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({[fault['fault'] for fault in self.faults]}, score {self.score:.3f})"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SequentialStep(_Record):
     """The pose of the object after one image, in the camera frame of that image.
