@@ -281,8 +281,8 @@ impl<'a> Context<'a> {
 
     /// Returns the model rendered at a pose, `camera_from_object`, in the observation's camera.
     ///
-    /// If the cache holds the pose, nothing is rendered. Returns `None` if the problem has no model
-    /// or no depth image.
+    /// Its triangles are those of [`Model::drawn`]. If the cache holds the pose, nothing is
+    /// rendered. Returns `None` if the problem has no model or no depth image.
     pub fn view(&mut self, camera_from_object: &Isometry3<f64>) -> Option<&RenderedView> {
         let (model, observation) = self.problem.sides()?;
         let camera = observation.camera();

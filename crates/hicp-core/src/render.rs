@@ -268,7 +268,8 @@ impl RenderCache {
     /// Returns the render of the whole image at a pose, `camera_from_object`, from the cache if
     /// possible.
     ///
-    /// The view covers the part of the image that the model's projection can cover.
+    /// The view covers the part of the image that the model's projection can cover. Its triangles
+    /// are those of [`Model::drawn`].
     pub fn view(
         &mut self,
         model: &Model,
@@ -291,7 +292,7 @@ impl RenderCache {
             self.entries[chosen].key = None;
             let view = &mut self.entries[chosen].view;
             self.renderer.render(
-                model.mesh(),
+                model.drawn(),
                 camera,
                 camera_from_object,
                 &camera.region(),

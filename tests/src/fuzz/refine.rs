@@ -126,6 +126,7 @@ fn model(bytes: &mut Bytes<'_>) -> Option<Model> {
         samples: bytes.below(250),
         diameter: bytes.one_in(8).then(|| bytes.any_number()),
         symmetries: symmetries(bytes),
+        ..ModelConfig::default()
     };
     Some(Model::with_config(mesh, config))
 }

@@ -12,6 +12,7 @@ mod color;
 mod concurrency;
 mod custom;
 mod degeneracy_scenes;
+mod dense_meshes;
 mod determinism;
 mod facade;
 mod fuzz_regressions;

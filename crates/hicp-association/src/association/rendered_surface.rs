@@ -76,7 +76,7 @@ impl DataAssociation for RenderedSurface {
         for v in (region.v_min.next_multiple_of(stride)..region.v_max).step_by(stride as usize) {
             for u in (region.u_min.next_multiple_of(stride)..region.u_max).step_by(stride as usize)
             {
-                let Some(source) = view.surfel_at(u, v, model.mesh(), camera, camera_from_object)
+                let Some(source) = view.surfel_at(u, v, model.drawn(), camera, camera_from_object)
                 else {
                     continue;
                 };

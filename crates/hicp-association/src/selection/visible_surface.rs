@@ -77,7 +77,7 @@ impl PointSelection for VisibleSurface {
         else {
             return;
         };
-        let (mesh, camera) = (model.mesh(), observation.camera());
+        let (mesh, camera) = (model.drawn(), observation.camera());
         let region = view.region();
         let rendered = view.n_rendered();
         if rendered == 0 {

@@ -295,6 +295,14 @@ impl TriMesh {
         *self.facing.get_or_init(|| find_facing(self))
     }
 
+    /// Returns the mesh with a known facing.
+    pub(crate) fn with_facing(self, facing: Facing) -> Self {
+        Self {
+            facing: OnceLock::from(facing),
+            ..self
+        }
+    }
+
     /// Returns whether the mesh is closed and consistently wound, so that back faces are never
     /// visible.
     #[must_use]

@@ -424,6 +424,7 @@ impl<'a, 'py> Options<'a, 'py> {
             samples: self.samples,
             diameter: self.diameter.map(|diameter| diameter * scale),
             symmetries,
+            ..ModelConfig::default()
         };
         let model = py.detach(|| Model::with_config(mesh, config));
         for warning in warnings_of_model(&model) {
