@@ -262,6 +262,8 @@ pub struct Outcome {
     pub iterations: usize,
     /// Pairs and loss at the returned pose, from the last part that evaluated it; `None` if none
     /// did.
+    ///
+    /// If none did, the outcome of a `hybrid_icp::Refinement` has those of the refiner's own fit.
     pub evaluation: Option<Evaluation>,
     /// Fit of the pairs at the returned pose, from the same part; `None` if none evaluated it.
     pub quality: Option<Quality>,
@@ -307,7 +309,8 @@ impl Outcome {
         };
         let moved = self.verdict == Verdict::Refined || next.verdict == Verdict::Refined;
         // An empty cascade does nothing, so it does not end anything.
-        let empty = next.iterations == 0 && next.termination == Termination::Converged;
+        let empty =
+            next.iterations == 0 && next.verdict == Verdict::KeptInitial(Termination::Converged);
         let termination = if empty {
             self.termination
         } else {

@@ -23,6 +23,9 @@ const COARSE_PIXELS: usize = 2500;
 pub struct Refinement {
     /// The pose (`outcome.camera_from_object`), the reason why the pipeline ended, and the numbers
     /// at that pose.
+    ///
+    /// If no part of the pipeline evaluated the pose, the evaluation and quality are those of the
+    /// refiner's own fit, point-to-plane over the rendered surface and the silhouette.
     pub outcome: Outcome,
     /// The mean VSD estimate of the initial pose: 0 agrees with the image everywhere, 1 nowhere.
     ///

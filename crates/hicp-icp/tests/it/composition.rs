@@ -56,6 +56,18 @@ fn outcomes_of_consecutive_stages_combine() {
     let stopped = outcome(1.0, stopped, 3, Some(5.0));
     let empty = Outcome::kept(&stopped.camera_from_object, Termination::Converged);
     assert_eq!(stopped.then(empty), stopped);
+    // A stage that moved the pose without iterations is not empty.
+    let limited = outcome(
+        0.0,
+        Verdict::KeptInitial(Termination::IterationLimit),
+        4,
+        None,
+    );
+    let moved = Outcome::refined(
+        Isometry3::translation(1.0, 0.0, 0.0),
+        Termination::Converged,
+    );
+    assert_eq!(limited.then(moved), outcome(1.0, Refined, 4, None));
 }
 
 #[test]
