@@ -20,7 +20,8 @@ pub trait Observer {
     /// Receives an evaluated pose. `Break` ends the stage there, with
     /// [`Termination::Stopped`](crate::Termination::Stopped).
     ///
-    /// If a stop rule rejects the pose, its judgment takes precedence. Composed stages continue
+    /// It is called before the stop rules judge the pose. If one rejects it, the stage does not
+    /// return this pose, and the judgment takes precedence over a `Break`. Composed stages continue
     /// with the next part and call the observer again.
     fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
         let _ = event;
@@ -152,6 +153,9 @@ impl Regime {
     pub const MISALIGNED: Self = Self(1);
 
     /// Returns the name in traces and files.
+    ///
+    /// Branch 1 is "misaligned" even if there are more than two branches, such as those of
+    /// `SwitchAmong`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self.0 {

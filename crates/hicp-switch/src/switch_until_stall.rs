@@ -44,6 +44,7 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for SwitchUntilStall<W, A, M> {
         if let Some(part) = self.switcher.unsupported(problem) {
             return Outcome::kept(init, Termination::Unsupported(part));
         }
+        let name = self.name();
         let mut judge = |pose: &Isometry3<f64>, session: &mut Session<'_>| {
             self.switcher.regime(&mut session.context(problem), pose)
         };
@@ -56,17 +57,14 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for SwitchUntilStall<W, A, M> {
             if step > 0 && score(&held) <= self.good_enough {
                 break;
             }
-            let aligned = (held.regime == Regime::ALIGNED) != other;
-            session.observer.on_regime(&RegimeEvent {
-                regime: if aligned {
-                    Regime::ALIGNED
-                } else {
-                    Regime::MISALIGNED
-                },
-                score: held.score,
-            });
+            let regime = match held.regime {
+                regime if !other => regime,
+                Regime::ALIGNED => Regime::MISALIGNED,
+                _ => Regime::ALIGNED,
+            };
+            session.observer.on_regime(&RegimeEvent { regime, ..held });
             let start = best.camera_from_object;
-            let next = if aligned {
+            let next = if regime == Regime::ALIGNED {
                 self.aligned.run(problem, &start, session)
             } else {
                 self.misaligned.run(problem, &start, session)
@@ -80,7 +78,7 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for SwitchUntilStall<W, A, M> {
             if let (Verdict::Refined, Some(score)) = (next.verdict, found.score) {
                 let (pose, kept) = (&next.camera_from_object, gain > 0.0);
                 let best = held.score.unwrap_or(f64::INFINITY);
-                let event = DecisionEvent::new("alternate", pose, score, best, kept);
+                let event = DecisionEvent::new(name, pose, score, best, kept);
                 session.observer.on_decision(&event);
             }
             if gain > 0.0 {

@@ -92,7 +92,10 @@ pub trait Stage {
         None
     }
 
-    /// Returns the name in traces.
+    /// Returns the name of the stage, which a stage that decides gives to its
+    /// [`DecisionEvent`](crate::DecisionEvent)s.
+    ///
+    /// Other events do not have it: the end of an ICP stage has the names of its components.
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }

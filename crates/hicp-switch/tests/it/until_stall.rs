@@ -41,11 +41,15 @@ impl Stage for Shift {
     }
 }
 
-/// The pose, the score, the best score and the decision of each event.
+/// The pose, the score, the best score and the decision of each event; and the regimes.
 #[derive(Default)]
-struct Decisions(Vec<(f64, f64, f64, bool)>);
+struct Decisions(Vec<(f64, f64, f64, bool)>, Vec<Regime>);
 
 impl Observer for Decisions {
+    fn on_regime(&mut self, event: &RegimeEvent) {
+        self.1.push(event.regime);
+    }
+
     fn on_decision(&mut self, event: &DecisionEvent<'_>) {
         let x = event.camera_from_object.translation.vector.x;
         self.0.push((x, event.score, event.best, event.kept));
@@ -83,6 +87,22 @@ fn a_custom_switcher_selects_and_scores() {
         (3.25, 1.25, 0.25, false),
     ];
     assert_eq!((end, &decisions[..]), (2.25, &expected[..]));
+}
+
+#[test]
+fn the_regime_of_the_switcher_is_reported_and_after_a_stall_the_other_one() {
+    let mut stage = SwitchUntilStall {
+        switcher: Regime(2),
+        aligned: Shift(0.5),
+        misaligned: Shift(1.0),
+        max_steps: 6,
+        min_gain: 0.01,
+        good_enough: 0.0,
+    };
+    let (mut workspace, mut seen) = (Workspace::new(RayCaster), Decisions::default());
+    let mut session = Session::new(&mut workspace, &mut seen);
+    stage.run(&Problem::default(), &Isometry3::identity(), &mut session);
+    assert_eq!(seen.1, [Regime(2), Regime::ALIGNED]);
 }
 
 #[test]
