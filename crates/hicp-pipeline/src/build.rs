@@ -95,11 +95,6 @@ impl<'a> Context<'a> {
         spot: &Spot,
         fields: Fields<'a>,
     ) -> Result<(K, u64), PipelineError> {
-        // The former name of this part in pipeline files.
-        let name = match name {
-            "warm-nearest-neighbor" => "nearest-neighbor",
-            name => name,
-        };
         let mut entries = self.entries.iter();
         let Some(entry) = entries.find(|e| e.part.kind == K::KIND && e.part.name == name) else {
             let problem = format!("no {} is named {name:?}", K::KIND.name());

@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-use hicp_sim::{Household, perturb, rng};
-use hicp_tests::{perturbed_scene, scene};
+use hicp_sim::{Household, rng};
+use hicp_tests::perturbed_scene;
 use hybrid_icp::icp::Stage;
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::pipeline::{Accepts, Catalog, PartKind};
@@ -28,21 +28,6 @@ fn every_shipped_file_gives_the_same_bits_as_its_code() {
             assert_eq!(found, expected, "{preset}");
         }
     }
-}
-
-#[test]
-fn the_former_name_of_nearest_neighbor_builds_the_same_part() {
-    let case = scene(Household::Mug, 0.5, &mut rng(22));
-    let init = perturb(&mut rng(23), &case.truth, 0.03, 0.4);
-    let current = Preset::NnPointToPlane.toml();
-    let former = current.replace("\"nearest-neighbor\"", "\"warm-nearest-neighbor\"");
-    assert_ne!(former, current);
-    let [found, expected] = [former.as_str(), current].map(|text| {
-        let file = PipelineFile::parse(text, "preset").unwrap();
-        let mut refiner = Refiner::boxed(file.build().unwrap());
-        refiner.refine(&case.model, &case.observation, &init)
-    });
-    assert_eq!(found, expected);
 }
 
 /// Returns TOML that uses a part and sets only the parameters without a default.
