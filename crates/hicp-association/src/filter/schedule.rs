@@ -9,6 +9,10 @@ use crate::filter::outlier_filter::OutlierFilter;
 /// A narrowing gate captures from far away and ends precisely. An example is
 /// `Schedule::new(vec![MaxDistance::diameters(0.5), MaxDistance::diameters(0.1)])`. Zhang 1994
 /// narrows by the distances found. Without filters, all pairs are kept.
+///
+/// The stop rule `Divergence` counts the pairs after the filters. It therefore ends a schedule that
+/// removes more and more pairs, with `PairsLost`. Use `Convergence` and an `IterationLimit` without
+/// it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Schedule<F> {
     /// The filters by iteration.

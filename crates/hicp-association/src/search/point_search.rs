@@ -10,8 +10,9 @@ use crate::search::point_tree::PointTree;
 ///
 /// It is the tree of [`NearestNeighbor`](crate::NearestNeighbor). Points that are not finite are
 /// never found. Of equally near points, the first is found. To share it between threads and runs,
-/// store it in the `derived()` cache of a model, cloud or observation, with one key per set of
-/// points.
+/// store it in the `derived()` cache of a model, cloud or observation. Values there are found by
+/// type and key, so wrap it in a private type: under the same key, another component's
+/// `PointSearch` over other points would be found.
 ///
 /// It also finds the data of the point behind a pair, such as a label or a color. A pair holds the
 /// moved point, which a selection may have copied or rendered. So search at its place in the
@@ -22,6 +23,9 @@ use crate::search::point_tree::PointTree;
 /// use hicp_association::{OutlierFilter, PointSearch};
 /// use hicp_core::{Correspondences, Iteration, RigidTransform};
 ///
+/// /// The tree over the surfels of the source; a private type, so that no other component has it.
+/// struct SourceSurfels(PointSearch);
+///
 /// /// Keeps the pairs of equal labels, one per surfel of the source and of the target.
 /// struct SameLabel {
 ///     source: Vec<u8>,
@@ -31,12 +35,13 @@ use crate::search::point_tree::PointTree;
 /// impl OutlierFilter for SameLabel {
 ///     fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
 ///         let Some(source) = iteration.problem.source() else { return };
-///         let search: Arc<PointSearch> = source.derived().get_or_build(0, || {
-///             PointSearch::new(source.surfels().iter().map(|surfel| surfel.point))
+///         let search: Arc<SourceSurfels> = source.derived().get_or_build(0, || {
+///             let points = source.surfels().iter().map(|surfel| surfel.point);
+///             SourceSurfels(PointSearch::new(points))
 ///         });
 ///         let object_from_camera = RigidTransform::new(&pairs.camera_from_object().inverse());
 ///         pairs.retain(|pair| {
-///             let surfel = search.nearest(&object_from_camera.point(&pair.source.point));
+///             let surfel = search.0.nearest(&object_from_camera.point(&pair.source.point));
 ///             let source = surfel.and_then(|surfel| self.source.get(surfel.element as usize));
 ///             source.is_some() && source == self.target.get(pair.target_index as usize)
 ///         });

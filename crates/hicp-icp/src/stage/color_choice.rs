@@ -38,7 +38,8 @@ pub struct ColorChoice<S, P, C> {
     pub polish: P,
     /// Scores the depth; lower is better.
     pub score: C,
-    /// The rise of that score up to which another pose is a choice, plus a fifth of the score.
+    /// Another pose is a choice if its score is at most 1.2 times that of the stage's pose, plus
+    /// this.
     pub tolerance: f64,
     /// The smallest correlation of colors at which they agree.
     pub least_correlation: f64,

@@ -11,6 +11,11 @@ use crate::stage::stage_trait::Stage;
 /// The coarse camera is phase-aligned with the fine one, so the pose needs no conversion.
 /// Coarse-to-fine is a cascade: `Cascade((AtResolution { factor: 4, stage }, AtResolution { factor:
 /// 2, stage }, stage))`. The coarse observation is built once per observation and shared.
+///
+/// A spacing that adapts to a number of points (`Stride::AboutPoints`, the default of selections
+/// and associations) gives a coarse stage about as many points as a fine one. To have fewer, use
+/// the same `Stride::Pixels` in all of them. If a side of the problem is a cloud, the stage runs
+/// unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AtResolution<S> {
     /// The distance between used pixels; 0 and 1 are the full resolution.

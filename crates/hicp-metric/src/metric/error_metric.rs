@@ -29,6 +29,10 @@ pub struct Step {
 /// - [`ErrorMetric::linearize_all`], if there is a faster loop over many pairs.
 /// - [`ErrorMetric::step`], if the minimum has a closed form.
 ///
+/// A metric may skip pairs by adding no rows for them. The provided mean losses count such a pair
+/// with an error of zero. To leave it out, override [`ErrorMetric::step`] *and*
+/// [`ErrorMetric::mean_squared_error`], because both must have the same mean.
+///
 /// Every error metric is a [`Minimize`](crate::Minimize), which is what a stage requires. A
 /// component that acts on the whole set of pairs (a robust kernel, a prior, a frozen axis)
 /// implements `Minimize` instead.

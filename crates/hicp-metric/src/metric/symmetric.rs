@@ -8,10 +8,11 @@ use crate::system::normal_equations::NormalEquations;
 
 /// E = (nᵀ (T^½ o − T^{−½} c))², where n = (n_o + n_c)/2 is the mean of both normals.
 ///
-/// Source: Rusinkiewicz, "A Symmetric Objective Function for ICP", TOG 2019, where the ½ is
-/// missing. Each side takes half of the motion. The error vanishes if both points lie on a common
-/// surface of second order. The metric therefore converges from farther away than
-/// [`PointToPlane`](crate::PointToPlane) and slides less on curved surfaces.
+/// Source: Rusinkiewicz, "A Symmetric Objective Function for ICP", TOG 2019, where n is the sum
+/// n_o + n_c. The mean has the scale of the other metrics. Each side takes half of the motion. The
+/// error vanishes if both points lie on a common surface of second order. The metric therefore
+/// converges from farther away than [`PointToPlane`](crate::PointToPlane) and slides less on curved
+/// surfaces.
 ///
 /// One step is *exact* for exact correspondences. With p̃ = p − p̄, q̃ = q − q̄ and the Gibbs
 /// vector a = axis · tan θ of the half rotation, this problem is linear without approximation:

@@ -105,8 +105,9 @@ pub(super) fn add(catalog: &mut Catalog) {
         })
     });
     catalog.add_filter("schedule", |p| {
-        p.about = "Applies one filter per iteration, the last from then on. Cost: that of the \
-            filter.";
+        p.about = "Applies one filter per iteration, the last from then on. The \
+            divergence rule of the default stop ends a schedule that removes more and more pairs; \
+            use convergence and iteration-limit instead. Cost: that of the filter.";
         Ok(Schedule::new(p.parts::<BoxedFilter>(
             "filters",
             None,

@@ -178,6 +178,11 @@ fn steps(p: &mut Parameters<'_>, usual: u32) -> Result<(usize, f64), PipelineErr
     p.repeats("iterations", iterations)?;
     Ok((
         iterations,
-        p.number("tolerance", METERS, 1e-6, "converged below this step")?,
+        p.number(
+            "tolerance",
+            Range::positive("RMS radii"),
+            1e-6,
+            "converged below this step",
+        )?,
     ))
 }

@@ -9,8 +9,9 @@ use crate::range::Range;
 use crate::work::Limited::Samples;
 
 /// The meaning of an occlusion tolerance.
-const HIDES: &str = "what something outside the mask must stand in front of the object to hide it; below 0 it may \
-    also lie that far behind, where the mask misses a part; inf is the paper's definition";
+const HIDES: &str = "a rendered pixel outside the mask counts unless the measured surface is more than this in front of it; \
+    below 0, it counts only if no surface is measured, or one at least that far behind it, for masks that miss a part; \
+    inf counts all, as in the paper";
 /// Any; a meter behind the object is nowhere near it.
 const TOLERANCE: Range = Range::new(-1.0, f64::INFINITY, "m");
 

@@ -152,7 +152,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         let polish = p.part::<BoxedStage>("polish", None, "moves poses to depth and colors")?;
         let score = p.part::<BoxedScore>("score", "mve", "judges the depth")?;
         let mut choice = ColorChoice::new(stage, polish, score);
-        let rise = "rise of that score, plus a fifth of it, up to which a pose is a choice";
+        let rise = "a pose is a choice up to 1.2 times that score of the stage's pose, plus this";
         choice.tolerance = p.number("tolerance", FACTOR, choice.tolerance, rise)?;
         let least = "correlation of colors at which they agree";
         let correlation = choice.least_correlation;
@@ -171,7 +171,9 @@ pub(super) fn add(catalog: &mut Catalog) {
     });
     catalog.add_stage("at-resolution", |p| {
         p.about = "Runs a stage on every n-th pixel, phase-aligned; coarse-to-fine is a cascade \
-            of these. Source: image pyramids. Cost: the stage on a coarser image.";
+            of these. A selection with points has as many points in all of them, and one with \
+            pixels has fewer in the coarse ones. If a side is a cloud, it runs the stage \
+            unchanged. Source: image pyramids. Cost: the stage on a coarser image.";
         Ok(AtResolution {
             factor: p.count("factor", 1, 2, "keeps every n-th pixel")?,
             stage: p.part::<BoxedStage>("stage", None, "what is run")?,
@@ -210,9 +212,10 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(stage)
     });
     catalog.add_stage("anderson", |p| {
-        p.about = "Runs a stage of one step again and again, from extrapolated poses. \
-            Source: Anderson 1965; Pavlov et al. 2018; Zhang, Yao & Deng 2021. Cost: steps × the \
-            stage.";
+        p.about = "Runs a stage of one step again and again, from extrapolated poses. A step \
+            evaluates two poses, so it saves time only if it halves the number of steps. \
+            Schedules, bounds, priors and time limits start again in each step. Source: Anderson \
+            1965; Pavlov et al. 2018; Zhang, Yao & Deng 2021. Cost: steps × the stage.";
         let stage = Anderson {
             stage: p.part::<BoxedStage>("stage", None, "ICP with an iteration limit of 2")?,
             max_steps: p.count("max_steps", 0, 50, "largest number of steps")?,

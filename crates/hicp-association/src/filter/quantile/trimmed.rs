@@ -7,7 +7,7 @@ use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::filter::quantile::distances::{collect_finite, nth_smallest, share_of};
 
-/// Keeps the closest share of the pairs (trimmed ICP, Chetverikov, Stepanov & Krsek 2005).
+/// Keeps the closest share of the pairs (trimmed ICP, Chetverikov et al. 2002).
 ///
 /// The limit is the ⌈keep·n⌉-th smallest of the n finite distances. Ties with it are kept, too, so
 /// the result does not depend on the order of the pairs. Pairs whose distance is not finite are
