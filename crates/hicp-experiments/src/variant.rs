@@ -11,7 +11,7 @@ use crate::error::ExperimentError;
 /// The path of the threshold α in a switch, and in a repeated one such as [`Preset::Hybrid`].
 const ALPHA_FIELD: &str = "switcher.alpha";
 
-/// A named pipeline: a preset, or a file.
+/// A named pipeline: a preset, or a file, built from the parts that ship.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Variant {

@@ -34,6 +34,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         association: NearestNeighbor::default(),
         filter: (narrowing, MaxNormalAngle::degrees(45.0)), // Filters chain.
         metric: PointToPlane,
+        // Without `Divergence`: it counts the pairs after the filters, and would end the stage when
+        // the limit falls.
         stop: (SmallMotion::default(), IterationLimit(50)),
     })
 }

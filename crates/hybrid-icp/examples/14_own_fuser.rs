@@ -75,7 +75,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         held: None,
         fusion: Fusion::default(),
     };
-    // With the covariances and the gate of an object; `SequentialEstimator::new` has neither.
+    // With the covariances, symmetries and gate of an object. The gate resets the fuser when it
+    // replaces everything held. `SequentialEstimator::new` has the covariances of its
+    // configuration, no symmetries and no gate.
     let mut estimator =
         SequentialEstimator::for_object(Preset::Hybrid.build(), fuser, &model, &given.detected)?;
     // The camera moves around the object by 5 mm and half a degree per image.

@@ -91,9 +91,11 @@ impl SequentialEstimator {
 
     /// Creates an estimator for an object.
     ///
-    /// `fuser` is a [`FusionMethod`], or any [`Fuser`], which receives what passes the gate.
-    /// Uncertainty is the MVE around the object's center, and rotations count by its radius.
-    /// Estimates with an MVE above 0.4 are skipped, and symmetric poses are brought together.
+    /// `fuser` is a [`FusionMethod`], or any [`Fuser`]. It is behind a [`Gated`], which resets it
+    /// to replace what it holds. Until an estimate passes the gate, it holds the best one that
+    /// failed. Uncertainty is the MVE around the object's center, and rotations count by its
+    /// radius. Later estimates with an MVE above 0.4 are skipped, and symmetric poses are brought
+    /// together.
     ///
     /// # Errors
     ///

@@ -42,7 +42,9 @@ impl Default for Gate {
 /// A fuser behind a [`Gate`]: estimates that fail are not fused.
 ///
 /// Until an estimate passes, the one with the lowest MVE, and the first of equals, is held alone
-/// and provisionally. Use it inside [`SymmetryAware`](crate::SymmetryAware) and not around it,
+/// and provisionally. The inner fuser therefore also receives estimates that failed, each after a
+/// [`Fuser::reset`]. It is reset again before the first estimate that passes, and before a restart.
+/// Use it inside [`SymmetryAware`](crate::SymmetryAware) and not around it,
 /// because a symmetric pose is not an outlier.
 ///
 /// ```
