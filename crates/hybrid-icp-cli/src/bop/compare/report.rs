@@ -76,7 +76,8 @@ const LOWEST: f64 = -1.0;
 const EXPLAINED: &str = "AR is the mean of the average recalls of VSD, MSSD and MSPD; ADI is that of the estimates matched to an \
     instance. ADD is over objects that are not symmetric. The row ray-shift moves each initial pose along its viewing ray by the \
     median depth difference. A pose is improved or worsened when its ADI fell or rose by more than 0.1 mm. Times are of one thread, for mask, \
-    normals and pipeline; compare their ratios. The 95 % intervals are those of the bootstrap over images. If that of the difference contains 0, \
+    normals, warnings, pipeline and confidence. They include what the first use of a model computes, which every pipeline does again. \
+    Compare their ratios, from tens of rows per object. The 95 % intervals are those of the bootstrap over images. If that of the difference contains 0, \
     the order of the two pipelines is not certain. With few images, intervals are too narrow.";
 
 impl Comparison {
