@@ -243,9 +243,10 @@ fn an_undetermined_rotation_stays_as_it_is() {
 /// Noise of normals gives the pairs of a can more information about its axis than the limit.
 #[test]
 fn noise_does_not_determine_a_rotation() {
-    for (object, is_open) in [(Household::Can, true), (Household::Mug, false)] {
+    let objects = [(Household::Can, true), (Household::Mug, false)];
+    for ((object, is_open), noise) in objects.into_iter().flat_map(|o| [(o, 1e-3), (o, 2.5e-3)]) {
         let [source, target] = [(12_000, 0.0), (13_000, 1.0)]
-            .map(|(n, azimuth)| cloud(&view(object, n, azimuth, 1e-3)));
+            .map(|(n, azimuth)| cloud(&view(object, n, azimuth, noise)));
         for kind in [Registration::PointToPlane, Registration::Generalized] {
             let found = aligned(kind, &source, &target);
             let pairs = found.outcome.quality.unwrap().observability().unwrap();

@@ -22,6 +22,11 @@ const OTHER_UNIT: f64 = 30.0;
 /// Largest distance between adjacent coordinates that never matters, also in a cloud of one point.
 const FINE_METERS: f64 = 1e-6;
 
+/// Largest number of pairs whose surface is examined.
+const MOST_PAIRS: usize = 4000;
+/// Number of patches that these make, with a normal each. Noise bends a smaller patch.
+const PATCHES: usize = 40;
+
 /// Squared share of a rotation in the open directions from which a warning names it.
 const ROTATION: f64 = 0.1;
 
@@ -189,7 +194,7 @@ pub(super) fn is_measured(point: &Point3<f32>) -> bool {
 
 /// Returns the warning about directions that the pairs, or the surface that they show, leave open.
 ///
-/// Normals of the source are estimated from some `neighbors`.
+/// Normals of the source are estimated from `neighbors` or more.
 pub(super) fn undetermined(
     quality: &Quality,
     pairs: &Correspondences,
@@ -221,10 +226,14 @@ fn surface(
     pairs: &Correspondences,
     neighbors: usize,
 ) -> Option<Observability> {
-    let points: Vec<_> = pairs.as_slice().iter().map(|p| p.source.point).collect();
-    let normals = estimate_normals(&points, neighbors);
+    let pairs = pairs.as_slice();
+    let some = pairs
+        .iter()
+        .step_by(pairs.len().div_ceil(MOST_PAIRS).max(1));
+    let points: Vec<_> = some.clone().map(|pair| pair.source.point).collect();
+    let normals = estimate_normals(&points, neighbors.max(points.len() / PATCHES));
     let mut common = NormalEquations::new(of_pairs.pivot, of_pairs.length);
-    for (pair, normal) in pairs.as_slice().iter().zip(normals) {
+    for (pair, normal) in some.zip(normals) {
         let Some(normal) = normal else { continue };
         let (point, weight) = (pair.source.point.cast::<f64>(), f64::from(pair.weight));
         let target = pair.target.normal.into_inner().cast::<f64>();
