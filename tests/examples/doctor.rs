@@ -42,13 +42,16 @@ struct Inputs {
 type Injected = (&'static str, &'static str, fn(Inputs) -> Inputs);
 
 #[rustfmt::skip]
-const FAULTS: [Injected; 48] = [
+const FAULTS: [Injected; 53] = [
     ("mesh: mm read as m", "the mesh is 1000 times too large", |i| i.mesh(1e3, false)),
     ("mesh: m read as mm", "the mesh is 1000 times too small", |i| i.mesh(1e-3, false)),
     ("mesh: cm read as m", "the mesh is 100 times too large", |i| i.mesh(1e2, false)),
     ("mesh: mm read as cm", "the mesh is 10 times too large", |i| i.mesh(10.0, false)),
     ("mesh: cm read as mm", "the mesh is 10 times too small", |i| i.mesh(0.1, false)),
     ("mesh: inches read as mm", "the mesh is 25.4 times too small", |i| i.mesh(1.0 / 25.4, false)),
+    ("mesh: size ×0.85", SIZE, |i| i.mesh(0.85, false)),
+    ("mesh: size ×0.9", SIZE, |i| i.mesh(0.9, false)),
+    ("mesh: size ×1.15", SIZE, |i| i.mesh(1.15, false)),
     ("mesh: inside out", "the mesh is inside out", |i| i.mesh(1.0, true)),
     ("depth: ×10", "the depth is 10 times too large", |i| i.depths(|_, _, z| z * 10.0)),
     ("depth: ×0.1", "the depth is 10 times too small", |i| i.depths(|_, _, z| z * 0.1)),
@@ -78,6 +81,8 @@ const FAULTS: [Injected; 48] = [
     ("image: mirrored, top", "depth image and mask are mirrored, t", |i| i.mirrored(false, true)),
     ("camera: twice the resolution", INTRINSICS, |i| i.camera(2.0, 2.0, 0.0)),
     ("camera: half the resolution", INTRINSICS, |i| i.camera(0.5, 0.5, 0.0)),
+    ("camera: 1.5 times the resolution", INTRINSICS, |i| i.camera(1.5, 1.5, 0.0)),
+    ("camera: 0.75 times the resolution", INTRINSICS, |i| i.camera(0.75, 0.75, 0.0)),
     ("camera: 1280×720, stretched", INTRINSICS, |i| i.camera(2.0, 1.5, 0.0)),
     ("camera: 1280×720, cropped", INTRINSICS, |i| i.camera(1.5, 1.5, 160.0)),
     ("camera: fx, fy and cx, cy exchanged", INTRINSICS, |i| {
@@ -130,6 +135,7 @@ const FAULTS: [Injected; 48] = [
     }),
 ];
 const RAY: &str = "depth: along the ray";
+const SIZE: &str = "the mesh is about ";
 const FOCAL: &str = "the focal length of the camera is ";
 const INTRINSICS: &str = "the intrinsics belong to images of another resolution";
 
@@ -244,10 +250,13 @@ impl Inputs {
 }
 
 /// Returns whether a fault is named, with the right numbers.
-fn is_named(found: &Fault, expected: &str, [clean, faulty]: [&PinholeCamera; 2]) -> bool {
+fn is_named(found: &Fault, expected: &str, inputs: [&Inputs; 2]) -> bool {
+    let [clean, faulty] = inputs.map(|inputs| &inputs.camera);
+    let [size, faulty_size] = inputs.map(|inputs| inputs.model.radius());
     let near = |a: f64, b: f64| (a / b - 1.0).abs() < 0.01;
     let is_right = match found {
         Fault::Intrinsics { fx, fy, .. } => near(*fx, clean.fx()) && near(*fy, clean.fy()),
+        Fault::MeshScale { factor } => (factor * faulty_size / size).ln().abs() < 0.1,
         Fault::FocalLength { factor } => (factor * faulty.fx() / clean.fx()).ln().abs() < 0.1,
         Fault::MaskTooLarge { .. } | Fault::PlaneInMask { .. } => true,
         _ => !expected.is_empty(),
@@ -316,9 +325,7 @@ fn main() -> Result<(), Failure> {
             }
             let diagnosis = diagnose(&faulty);
             match diagnosis.fault() {
-                Some(found) if is_named(found, expected, [&inputs.camera, &faulty.camera]) => {
-                    row.named += 1
-                }
+                Some(found) if is_named(found, expected, [inputs, &faulty]) => row.named += 1,
                 found => {
                     row.missed += 1;
                     let found = found.map_or("nothing".into(), Fault::to_string);

@@ -16,9 +16,10 @@ pub enum Fault {
     NoDepth,
     /// The triangles of the mesh face inward.
     MeshInsideOut,
-    /// The mesh has the wrong unit.
+    /// The mesh has the wrong unit or size.
     MeshScale {
-        /// The number by which its coordinates must be multiplied.
+        /// The number by which its coordinates must be multiplied; from 0.5 to 2, it is known to a
+        /// few percent.
         factor: f64,
     },
     /// The depth image has the wrong scale.
@@ -134,6 +135,10 @@ impl Fault {
                 "the mesh is inside out: its triangles face inward",
                 "reverse the order of the corners of every triangle",
             ),
+            Self::MeshScale { factor } if (0.5..=2.0).contains(&factor) => (
+                about("the mesh", factor),
+                "compare a length of the object with that of the mesh".to_owned(),
+            ),
             Self::MeshScale { factor } => scale("the mesh", factor),
             Self::DepthScale { factor } => scale("the depth", factor),
             Self::TranslationScale { factor } => scale("the translation of the pose", factor),
@@ -158,7 +163,7 @@ impl Fault {
                     format!("the quaternion of the pose is {right}, but was read as {wrong}");
                 (
                     fault,
-                    format!("read the numbers of the quaternion as {right}"),
+                    format!("if the pose was made of a quaternion, read its numbers as {right}"),
                 )
             }
             Self::Origin { shift_meters } => {
@@ -179,14 +184,11 @@ impl Fault {
                 (fault, format!("use fx {fx}, fy {fy}, cx {cx}, cy {cy}"))
             }
             Self::FocalLength { factor } => {
-                let (times, size) = match factor < 1.0 {
-                    true => (1.0 / factor, "large"),
-                    false => (factor, "small"),
-                };
-                let fault =
-                    format!("the focal length of the camera is about {times:.2} times too {size}");
                 let fix = "use the intrinsics of the camera that took the depth image";
-                (fault, fix.to_owned())
+                (
+                    about("the focal length of the camera", factor),
+                    fix.to_owned(),
+                )
             }
             Self::RayDistance => texts(
                 "the depth image has distances along the ray instead of depths",
@@ -242,6 +244,15 @@ impl Fault {
             ),
         }
     }
+}
+
+/// Returns the fault of a quantity of which a factor is known to a few percent.
+fn about(what: &str, factor: f64) -> String {
+    let (times, size) = match factor < 1.0 {
+        true => (1.0 / factor, "large"),
+        false => (factor, "small"),
+    };
+    format!("{what} is about {times:.2} times too {size}")
 }
 
 impl fmt::Display for Fault {

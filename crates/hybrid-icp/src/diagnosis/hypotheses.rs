@@ -1,6 +1,7 @@
 //! The hypotheses: for each possible fault, the inputs without it.
 
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 use hicp_core::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
@@ -11,18 +12,19 @@ use super::images::{
 };
 use super::inputs::Inputs;
 use super::scales::{
-    DECIMAL, depth_scale, focal_length, intrinsics, mesh_scale, translation_scale,
+    DECIMAL, depth_scale, focal_length, intrinsics, mesh_scale, mesh_size, translation_scale,
 };
 
 /// The possible faults of some inputs, each with the corrected inputs.
 type Hypothesis = for<'a> fn(&Inputs<'a>) -> Vec<(Fault, Inputs<'a>)>;
 
-/// Smallest distance between two origins that is a fault, in diameters.
-const ELSEWHERE: f64 = 0.25;
+/// Distances between two origins of a model that are a fault, in diameters.
+const ELSEWHERE: RangeInclusive<f64> = 0.25..=3.0;
 
 /// All hypotheses.
-pub(super) const ALL: [Hypothesis; 14] = [
+pub(super) const ALL: [Hypothesis; 15] = [
     mesh_scale,
+    mesh_size,
     depth_scale,
     translation_scale,
     pose_convention,
@@ -44,12 +46,12 @@ pub(super) const ALL: [Hypothesis; 14] = [
 /// inputs a little, and that of inputs with another fault.
 pub(super) fn handicap(fault: &Fault) -> f64 {
     match fault {
-        Fault::DepthInverted
-        | Fault::Misaligned { .. }
-        | Fault::MaskTooLarge { .. }
-        | Fault::PlaneInMask { .. } => 0.02,
+        Fault::DepthInverted | Fault::Misaligned { .. } => 0.02,
+        // These remove all that contradicts the model, also if it is the model that is wrong.
+        Fault::MaskTooLarge { .. } | Fault::PlaneInMask { .. } => 0.06,
         // The mask of another object at another place is also explained a little.
         Fault::Origin { .. } => 0.2,
+        Fault::MeshScale { factor } if (0.5..=2.0).contains(factor) => 0.03,
         Fault::MeshScale { factor } if !DECIMAL.contains(factor) => 0.05,
         Fault::FocalLength { .. } => 0.05,
         Fault::Disparity { product } if product.log10().fract() != 0.0 => 0.1,
@@ -95,7 +97,7 @@ fn origin<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
     let shift = inputs.init.rotation.inverse()
         * (found.init.translation.vector - inputs.init.translation.vector);
     let shift_meters = shift.into();
-    match shift.norm() > ELSEWHERE * inputs.model.diameter() {
+    match ELSEWHERE.contains(&(shift.norm() / inputs.model.diameter())) {
         true => vec![(Fault::Origin { shift_meters }, found)],
         false => Vec::new(),
     }

@@ -20,8 +20,11 @@ const SIZES: [[f64; 2]; 24] = [
     [1280., 1024.], [1440., 1080.], [1600., 1200.], [1920., 1080.], [2048., 1536.], [3840., 2160.],
 ];
 /// Factors between images of the same shape.
-const FACTORS: [f64; 8] = [0.25, 1.0 / 3.0, 0.5, 0.75, 1.5, 2.0, 3.0, 4.0];
-/// Factors of focal lengths: powers of a number, from a half to two.
+#[rustfmt::skip]
+const FACTORS: [f64; 10] = [
+    0.25, 1.0 / 3.0, 0.5, 2.0 / 3.0, 0.75, 4.0 / 3.0, 1.5, 2.0, 3.0, 4.0,
+];
+/// Factors of focal lengths and sizes: powers of a number, from a half to two.
 const STEP: f64 = 1.05;
 const STEPS: i32 = 14;
 /// Mantissas of usual depth scales.
@@ -36,25 +39,45 @@ pub(super) fn mesh_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
         let seen = angle * z / (factor * model.diameter());
         z > factor * model.radius() && (0.04..1.2).contains(&seen)
     };
-    let scaled = |factor: f64| {
-        let vertices = model.mesh().vertices().iter();
-        #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-        let vertices = vertices.map(|p| (p.cast::<f64>() * factor).cast::<f32>());
-        let mesh = TriMesh::new(vertices.collect(), model.mesh().triangles().to_vec()).ok()?;
-        let config = ModelConfig {
-            samples: model.samples().len(),
-            diameter: Some(model.diameter() * factor),
-            ..ModelConfig::default()
-        };
-        let model = Cow::Owned(Model::with_config(mesh, config));
-        let inputs = Inputs {
-            model,
-            ..inputs.clone()
-        };
-        Some((Fault::MeshScale { factor }, inputs))
-    };
     let factors = DECIMAL.into_iter().chain(INCHES).filter(plausible);
-    factors.filter_map(scaled).collect()
+    factors
+        .filter_map(|factor| with_mesh(inputs, factor))
+        .collect()
+}
+
+/// Returns the inputs with the mesh times a factor.
+fn with_mesh<'a>(inputs: &Inputs<'a>, factor: f64) -> Option<(Fault, Inputs<'a>)> {
+    let model = &inputs.model;
+    let vertices = model.mesh().vertices().iter();
+    #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
+    let vertices = vertices.map(|p| (p.cast::<f64>() * factor).cast::<f32>());
+    let mesh = TriMesh::new(vertices.collect(), model.mesh().triangles().to_vec()).ok()?;
+    let config = ModelConfig {
+        samples: model.samples().len(),
+        diameter: Some(model.diameter() * factor),
+        ..ModelConfig::default()
+    };
+    let inputs = Inputs {
+        model: Cow::Owned(Model::with_config(mesh, config)),
+        ..inputs.clone()
+    };
+    Some((Fault::MeshScale { factor }, inputs))
+}
+
+/// With the right size, the model covers the mask best.
+pub(super) fn mesh_size<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+    // The silhouette of a larger object is that of a nearer one.
+    let overlap = |factor: f64| Some(inputs.with_scaled_translation(1.0 / factor).overlap());
+    let found = best_factor(overlap).and_then(|factor| with_mesh(inputs, factor));
+    found.into_iter().collect()
+}
+
+/// Returns the factor with the best score, if it is not 1 or nearly so.
+fn best_factor(score: impl Fn(f64) -> Option<f64>) -> Option<f64> {
+    let factors = (-STEPS..=STEPS).map(|step| STEP.powi(step));
+    let scored = factors.filter_map(|factor| Some((score(factor)?, factor)));
+    let (_, best) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (best.ln().abs() > 1.5 * STEP.ln()).then_some(best)
 }
 
 pub(super) fn depth_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
@@ -89,24 +112,14 @@ pub(super) fn focal_length<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> 
         let (fx, fy) = (old.fx() * factor, old.fy() * factor);
         let size = (old.width(), old.height());
         let camera = PinholeCamera::new(fx, fy, old.cx(), old.cy(), size.0, size.1).ok()?;
-        let inputs = Inputs {
+        Some(Inputs {
             camera,
             ..inputs.clone()
-        };
-        Some((inputs.overlap(), (Fault::FocalLength { factor }, inputs)))
+        })
     };
-    let factors = (-STEPS..=STEPS).map(|step| STEP.powi(step));
-    let best = factors
-        .filter_map(scaled)
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    let other = |(fault, _): &(Fault, _)| match fault {
-        Fault::FocalLength { factor } => factor.ln().abs() > 1.5 * STEP.ln(),
-        _ => false,
-    };
-    best.map(|(_, found)| found)
-        .filter(other)
-        .into_iter()
-        .collect()
+    let best = best_factor(|factor| Some(scaled(factor)?.overlap()));
+    let found = best.and_then(|factor| Some((Fault::FocalLength { factor }, scaled(factor)?)));
+    found.into_iter().collect()
 }
 
 /// The principal point is near the middle of the image that the intrinsics belong to.
