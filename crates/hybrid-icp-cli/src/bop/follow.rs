@@ -113,7 +113,7 @@ impl FollowOptions {
     pub(super) fn distrust(&self, images: usize, failed: &str) {
         warn(format_args!(
             "{}: {failed} in none of its {images} images: do not trust its poses, and check {}, {}, \
-             and cam_K and depth_scale in scene_camera.json",
+             --object and its mesh, and cam_K and depth_scale in scene_camera.json",
             self.output.display(),
             self.init.display(),
             self.check_unit()

@@ -8,10 +8,12 @@ use hicp_bop::{ModelFolder, Models, chain};
 use hicp_io::bop::Dataset;
 use hicp_io::{IoError, LengthUnit};
 use hybrid_icp::core::Model;
-use hybrid_icp::warning_of_diameter;
+use hybrid_icp::{warning_of_diameter, warnings_of_model};
 use rayon::prelude::*;
 
+use crate::bop::advice::is_about_diameter;
 use crate::limits::limits;
+use crate::terminal::warn;
 
 /// The options for the models to register.
 #[derive(Clone, Debug, Default, Args)]
@@ -72,6 +74,27 @@ pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoErro
 pub(crate) fn read_from(folder: &ModelFolder, objects: &BTreeSet<u32>) -> Models {
     let read = objects.par_iter().map(|id| (*id, folder.read(*id)));
     read.collect::<Vec<_>>().into_iter().collect()
+}
+
+/// Warns of models that seem to have another unit, and of diameters that differ from the meshes.
+///
+/// `dir` is their folder, and `info` the path of `models_info.json`.
+pub(crate) fn warn_of(models: &Models, dir: &Path, info: &Path) {
+    undescribed(models, info).into_iter().for_each(warn);
+    let diameters = wrong_diameters(models, info);
+    for (obj_id, model) in &models.by_id {
+        let diameter = diameters.get(obj_id);
+        diameter.into_iter().for_each(warn);
+        for warning in warnings_of_model(model) {
+            // One warning about the same number is enough.
+            if diameter.is_none() || !is_about_diameter(&warning) {
+                let dir = dir.display();
+                warn(format_args!(
+                    "object {obj_id}: {warning}: check that {dir} is in mm"
+                ));
+            }
+        }
+    }
 }
 
 /// Returns a message for each object whose diameter in `models_info.json` differs from its mesh.

@@ -28,8 +28,10 @@ use crate::terminal::{counted, progress_bar, say, warn};
 /// The output has one line of JSON per image: the pose (cam_R_m2c, cam_t_m2c in mm), the state
 /// (tracking, doubtful or lost), and the evidence. The score is the share of the visible pixels
 /// that agree with the pose (in Python, `agreement`). While an object is lost, its pose is a guess,
-/// and it is searched around it, and the result file has no row. deviation_mm is the standard
-/// deviation of the least determined displacement (in Python, `deviation`, in meters).
+/// around which it is searched. deviation_mm is the standard deviation of the least determined
+/// displacement (in Python, `deviation`, in meters), and time the seconds that the image took.
+/// Use a pose only if its state is tracking. In the result file, the score of a doubtful pose is 0,
+/// and a lost object has no row.
 ///
 /// The exit code is 0 even if the object is lost; the summary counts the states. The pose in an
 /// image whose depth is missing or damaged is predicted. If a file is damaged, the exit code is 1,
@@ -99,10 +101,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
              motion of the object is not predicted"
         ));
     }
-    let diameters = models::wrong_diameters(&models, &dataset.models_info_path()?);
-    diameters.values().for_each(warn);
-    let tracking = |line: &Line| line.tracked.state == TrackState::Tracking;
-    if !lines.iter().any(tracking) {
+    models::warn_of(
+        &models,
+        &dataset.models_dir()?,
+        &dataset.models_info_path()?,
+    );
+    if !lines.iter().any(Line::is_tracking) {
         follow.distrust(lines.len(), "the object is tracked");
     }
     if let Some(damaged) = faults::report(faults.iter(), [].iter()) {
@@ -161,11 +165,18 @@ impl Arguments {
 }
 
 impl Line {
-    /// Returns the row of a result file, with the agreement as its score.
+    fn is_tracking(&self) -> bool {
+        self.tracked.state == TrackState::Tracking
+    }
+
+    /// Returns the row of a result file. Its score is the agreement, or 0 if the pose is doubtful.
     fn row(&self, scene_id: u32, obj_id: u32) -> ResultRow {
         let pose = self.tracked.camera_from_object;
         let mut row = ResultRow::new(scene_id, self.im_id, obj_id, pose);
-        row.score = self.tracked.agreement();
+        row.score = match self.is_tracking() {
+            true => self.tracked.agreement(),
+            false => 0.0,
+        };
         row
     }
 

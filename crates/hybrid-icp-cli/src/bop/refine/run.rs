@@ -31,7 +31,7 @@ impl RefineJob<'_> {
         let settings = settings::of(self, &rows, &folder);
         let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
         let models = pool.install(|| models::read_from(&folder, &objects));
-        pool.install(|| warnings::about_models(&models, &folder));
+        pool.install(|| models::warn_of(&models, folder.dir(), folder.info_path()));
         let uncolored = models::color_faults(&self.models, &models, &folder);
         uncolored.iter().for_each(warn);
         let shared = DatasetRefiner {

@@ -2,38 +2,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use hicp_bop::{FrameResult, ModelFolder, Models};
+use hicp_bop::FrameResult;
 use hicp_io::bop::ResultRow;
-use hybrid_icp::{Warning, warnings_of_model};
+use hybrid_icp::Warning;
 
-use crate::bop::advice::{advice, is_about_diameter};
+use crate::bop::advice::advice;
 use crate::bop::models;
-use crate::terminal::warn;
 
 /// Largest number of objects with the same advice that are described one by one.
 const OBJECTS_SHOWN: usize = 3;
 /// Largest number of scenes or of further objects that a message names.
 const IDS_SHOWN: usize = 5;
-
-/// Warns of models that seem to have another unit and of diameters that differ from the meshes.
-pub(super) fn about_models(models: &Models, folder: &ModelFolder) {
-    let undescribed = models::undescribed(models, folder.info_path());
-    undescribed.into_iter().for_each(warn);
-    let diameters = models::wrong_diameters(models, folder.info_path());
-    for (obj_id, model) in &models.by_id {
-        let diameter = diameters.get(obj_id);
-        diameter.into_iter().for_each(warn);
-        for warning in warnings_of_model(model) {
-            // One warning about the same number is enough.
-            if diameter.is_none() || !is_about_diameter(&warning) {
-                warn(format_args!(
-                    "object {obj_id}: {warning}: check that {} is in mm",
-                    folder.dir().display()
-                ));
-            }
-        }
-    }
-}
 
 /// A scene, its number of images with the warning, its number of images, and the first warning.
 type OfScene = (u32, usize, usize, Warning);

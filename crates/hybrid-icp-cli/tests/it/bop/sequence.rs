@@ -157,7 +157,7 @@ fn impossible_scales_and_sizes_are_warned_of() {
     };
     let none = format!(
         "warning: out.jsonl: an estimate is accepted in none of its 7 images: do not trust its poses, \
-         and check {INITIAL}, that --init is in mm, and cam_K and depth_scale in scene_camera.json\n"
+         and check {INITIAL}, that --init is in mm, --object and its mesh, and cam_K and depth_scale in scene_camera.json\n"
     );
     let none = none.as_str();
     assert_eq!(scaled(2.0).err, none);
