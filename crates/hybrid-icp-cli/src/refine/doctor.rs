@@ -19,11 +19,11 @@ use crate::terminal::{check_stdout, say, warn};
 ///
 /// Each fault that inputs can have is corrected on trial, and a short refinement scores the
 /// corrected inputs: 0 is perfect, 1 the worst. A fault is named if its correction improves the
-/// score clearly. The most probable fault comes first. The faults: wrong units and scales (with the
-/// factor), ray distances, inverted depth, disparities, intrinsics of another resolution or order,
-/// a transposed or inverted pose, OpenGL axes, a quaternion of another order, a model with another
-/// origin, mirrored images, depth and mask that are not aligned, an inside-out mesh, and masks that
-/// are inverted, empty, soft, label images, too large, or on a plane.
+/// score clearly. The most probable fault comes first. The faults: wrong units, scales and sizes
+/// (with the factor), ray distances, inverted depth, disparities, intrinsics of another resolution
+/// or order, a transposed or inverted pose, OpenGL axes, a quaternion of another order, a model
+/// with another origin, mirrored images, depth and mask that are not aligned, an inside-out mesh,
+/// and masks that are inverted, empty, soft, label images, too large, or on a plane.
 ///
 /// With --json, the keys are faults (a list of objects with fault, problem, fix, option, score and
 /// numbers), score (of the inputs as they are) and warnings. The exit code is 0 if the files can be

@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 
 use hicp_io::{LengthUnit, pose_to_bop};
-use hybrid_icp::core::{DepthImage, Isometry3, Quaternion, Translation3, UnitQuaternion};
+use hybrid_icp::core::{DepthImage, Isometry3, Quaternion, Translation3, TriMesh, UnitQuaternion};
 use serde_json::{Value, json};
 
 use crate::common::*;
@@ -94,6 +94,22 @@ fn wrong_units_and_scales_are_named_with_the_option_that_corrects_them() {
 }
 
 #[test]
+fn a_wrong_size_is_named_with_its_factor() {
+    let scene = Scene::new();
+    for factor in [0.87_f32, 1.15] {
+        let mesh = car();
+        let vertices = mesh.vertices().iter().map(|p| p * factor).collect();
+        let scaled = TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap();
+        hicp_io::write_ply(scene.path("mesh.ply"), &scaled, LengthUnit::Meters).unwrap();
+        let (_, json) = examine(&scene);
+        let mut faults = json["faults"].as_array().unwrap().iter();
+        let size = faults.find(|fault| fault["fault"] == "mesh_scale");
+        let found = size.unwrap()["factor"].as_f64().unwrap();
+        assert!((found * f64::from(factor)).ln().abs() < 0.06, "{json}");
+    }
+}
+
+#[test]
 fn wrong_poses_are_named() {
     let turn = Isometry3::rotation(std::f64::consts::PI * hybrid_icp::core::Vector3::x());
     names(&posed(|pose| pose.inverse()), "pose_inverted", None);
@@ -158,11 +174,13 @@ fn wrong_masks_and_images_are_named() {
 
     let scene = Scene::new();
     let camera: Value = serde_json::from_str(FLAT_CAMERA).unwrap();
-    let doubled = |key: &str| json!(2.0 * camera[key].as_f64().unwrap());
-    let camera =
-        json!({"fx": doubled("fx"), "fy": doubled("fy"), "cx": doubled("cx"), "cy": doubled("cy")});
-    scene.write("camera.json", camera.to_string());
-    names(&scene, "intrinsics", None);
+    for factor in [0.75, 1.5, 2.0] {
+        let [fx, fy, cx, cy] =
+            ["fx", "fy", "cx", "cy"].map(|key| factor * camera[key].as_f64().unwrap());
+        let camera = json!({"fx": fx, "fy": fy, "cx": cx, "cy": cy});
+        scene.write("camera.json", camera.to_string());
+        names(&scene, "intrinsics", None);
+    }
     // Those of another camera with images of this size.
     for factor in [1.2, 1.4] {
         scene.write("camera.json", FLAT_CAMERA);
@@ -186,7 +204,7 @@ fn wrong_masks_and_images_are_named() {
         .iter()
         .map(|[a, b, c]| [*a, *c, *b])
         .collect();
-    let mesh = hybrid_icp::core::TriMesh::new(mesh.vertices().to_vec(), turned).unwrap();
+    let mesh = TriMesh::new(mesh.vertices().to_vec(), turned).unwrap();
     hicp_io::write_ply(scene.path("mesh.ply"), &mesh, LengthUnit::Meters).unwrap();
     names(&scene, "mesh_inside_out", None);
 }
