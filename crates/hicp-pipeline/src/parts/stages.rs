@@ -290,7 +290,7 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
         rotation_degrees: p.number("max_rotation_degrees", DEGREES, INFINITY, far)?,
     };
     let bounded = bound.translation_meters.is_finite() || bound.rotation_degrees.is_finite();
-    let time = "time limit of a run; if finite, results depend on the clock";
+    let time = "time after which a search ends; if finite, results depend on the clock";
     let milliseconds: f64 = p.number("milliseconds", Range::positive("ms"), INFINITY, time)?;
     Ok(SearchOptions {
         bound: bounded.then_some(bound),
