@@ -34,8 +34,8 @@ use crate::terminal::{counted, progress_bar, say, warn};
 /// and a lost object has no row.
 ///
 /// The exit code is 0 even if the object is lost; the summary counts the states. The pose in an
-/// image whose depth is missing or damaged is predicted. If a file is damaged, the exit code is 1,
-/// and the lines are still written.
+/// image whose depth is missing or damaged is predicted. If a file is damaged, or no depth can be
+/// read, the exit code is 1, and the lines are still written.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
@@ -106,10 +106,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &dataset.models_dir()?,
         &dataset.models_info_path()?,
     );
+    let damaged = faults::report(faults.iter(), [].iter());
+    if faults.len() == lines.len() {
+        bail!(
+            "the depth of no image could be read: all poses in {} are guesses",
+            follow.output.display()
+        );
+    }
     if !lines.iter().any(Line::is_tracking) {
         follow.distrust(lines.len(), "the object is tracked");
     }
-    if let Some(damaged) = faults::report(faults.iter(), [].iter()) {
+    if let Some(damaged) = damaged {
         bail!(
             "{damaged}; in their images, {} has a predicted pose",
             follow.output.display()

@@ -76,6 +76,13 @@ fn images_that_cannot_be_read_are_reported_and_have_a_predicted_pose() {
         assert_eq!(lines.len(), 4);
         assert_ne!(lines[2]["state"], "tracking");
     }
+    for image in 0..4 {
+        folder.remove(&format!("set/test/000001/depth/{image:06}.png"));
+    }
+    folder
+        .command(TRACK)
+        .fails(&["the depth of no image could be read", "out.jsonl"]);
+    assert_eq!(folder.json_lines("out.jsonl").len(), 4);
 }
 
 #[test]
