@@ -77,7 +77,7 @@ fn images_that_cannot_be_read_are_reported_and_have_a_predicted_pose() {
         assert_ne!(lines[2]["state"], "tracking");
     }
     for image in 0..4 {
-        folder.remove(&format!("set/test/000001/depth/{image:06}.png"));
+        folder.remove(format!("set/test/000001/depth/{image:06}.png"));
     }
     folder
         .command(TRACK)
