@@ -115,12 +115,5 @@ fn noise_without_a_surface_is_not_simplified() {
     });
     let triangles = (0..30_000).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
     let model = Model::new(TriMesh::new(vertices.collect(), triangles.collect()).unwrap());
-    let drawn = model.drawn();
-    assert!(drawn.triangles().len() == 30_000 || drawn.triangles().len() < 15_000);
-    assert!(
-        drawn
-            .vertices()
-            .iter()
-            .all(|p| p.iter().all(|x| x.is_finite()))
-    );
+    assert!(std::ptr::eq(model.drawn(), model.mesh()));
 }

@@ -43,8 +43,9 @@ impl Default for ModelConfig {
             samples: 1000,
             diameter: None,
             symmetries: Symmetries::default(),
-            // Deviation: dense meshes: §III-A renders the model. Above this size, a simplified mesh
-            // is rendered, because the time of a render is proportional to its triangles.
+            // Deviation: dense meshes: §III-A renders the model. If it has more triangles than this
+            // and no colors, a simplified mesh is rendered, because the time of a render is
+            // proportional to its triangles.
             simplify_above: 20_000,
         }
     }
