@@ -283,8 +283,10 @@ impl<S: Stage> Refiner<S> {
         if near && let Some((model, observation)) = problem.sides() {
             // In the full image, their renders would take longer than a refinement.
             let factor = (observation.n_measured() / COARSE_PIXELS).isqrt();
-            let coarse = observation.decimated(u32::try_from(factor).unwrap_or(u32::MAX));
-            look_alikes = self.look_alikes(&Problem::new(model, &coarse), pose);
+            let factor = u32::try_from(factor).unwrap_or(u32::MAX);
+            let coarse = (factor > 1).then(|| observation.decimated(factor));
+            let coarse = coarse.as_deref().unwrap_or(observation);
+            look_alikes = self.look_alikes(&Problem::new(model, coarse), pose);
             confidence = confidence.near_initial(look_alikes);
         }
         Refinement {

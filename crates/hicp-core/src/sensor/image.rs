@@ -157,6 +157,33 @@ impl DepthImage {
 
     image_accessors!(f32);
 
+    /// Returns the image of every `factor`-th pixel of every `factor`-th row, from pixel (0, 0).
+    ///
+    /// # Panics
+    ///
+    /// If `factor` is 0.
+    #[must_use]
+    pub fn decimated(&self, factor: u32) -> Self {
+        let (width, height) = (
+            self.width().div_ceil(factor),
+            self.height().div_ceil(factor),
+        );
+        let mut pixels = Vec::with_capacity(width as usize * height as usize);
+        for row in self
+            .pixels()
+            .chunks_exact(self.width().max(1) as usize)
+            .step_by(factor as usize)
+        {
+            // Steps through the row's iterator take more instructions.
+            pixels.extend((0..row.len()).step_by(factor as usize).map(|u| row[u]));
+        }
+        Self(Raster {
+            width,
+            height,
+            pixels,
+        })
+    }
+
     /// Returns the distance image: the range along each pixel's ray instead of the depth, in
     /// meters.
     ///

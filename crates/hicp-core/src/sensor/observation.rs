@@ -379,33 +379,11 @@ impl Observation {
     }
 
     fn decimate(&self, factor: u32) -> Self {
-        let step = factor as usize;
-        let (width, height) = (
-            self.depth.width().div_ceil(factor),
-            self.depth.height().div_ceil(factor),
-        );
-        let fine_width = self.depth.width() as usize;
-        let n_pixels = width as usize * height as usize;
-        let mut depth: Vec<f32> = Vec::with_capacity(n_pixels);
-        let mut mask: Vec<bool> = Vec::with_capacity(n_pixels);
-        for v in (0..self.depth.height() as usize).step_by(step) {
-            let row = v * fine_width..(v + 1) * fine_width;
-            depth.extend(self.depth.pixels()[row.clone()].iter().step_by(step));
-            mask.extend(self.mask.pixels()[row].iter().step_by(step));
-        }
-        let region = PixelRegion {
-            u_min: self.region.u_min.div_ceil(factor),
-            v_min: self.region.v_min.div_ceil(factor),
-            u_max: self.region.u_max.div_ceil(factor),
-            v_max: self.region.v_max.div_ceil(factor),
-        };
+        let region = self.region.decimated(factor);
         let camera = self.camera.scaled_down(factor);
-        let (Ok(depth), Ok(mask)) = (
-            DepthImage::from_meters(width, height, depth),
-            Mask::new(width, height, mask),
-        ) else {
-            unreachable!("the pixels were collected for an image of {width}x{height}");
-        };
+        let is_set = |u, v| self.mask.get(u * factor, v * factor) == Some(true);
+        let mask = Mask::in_region(camera.width(), camera.height(), &region, is_set);
+        let depth = self.depth.decimated(factor);
         Self {
             id: Id::next(),
             camera,

@@ -103,6 +103,24 @@ impl PixelRegion {
         }
     }
 
+    /// Returns the region of its pixels in an image of every `factor`-th pixel of every `factor`-th
+    /// row.
+    ///
+    /// # Panics
+    ///
+    /// If `factor` is 0.
+    #[must_use]
+    pub fn decimated(&self, factor: u32) -> Self {
+        let [u_min, v_min, u_max, v_max] =
+            [self.u_min, self.v_min, self.u_max, self.v_max].map(|edge| edge.div_ceil(factor));
+        Self {
+            u_min,
+            v_min,
+            u_max,
+            v_max,
+        }
+    }
+
     /// Returns the common part of two regions; empty, but well formed, if they do not overlap.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {

@@ -35,9 +35,16 @@ impl ReadLimits {
         let samples = image.color.samples();
         let has_alpha = matches!(image.color, ColorType::GrayscaleAlpha | ColorType::Rgba);
         let opaque = (samples - usize::from(has_alpha)) * sample_bytes;
-        let pixels = image.bytes.chunks_exact(samples * sample_bytes);
-        let mask = pixels.map(|pixel| pixel[..opaque].iter().any(|byte| *byte != 0));
-        let mask = Mask::new(image.width, image.height, mask.collect());
+        let mask = match samples * sample_bytes {
+            // The loop over pixels of any size takes twenty instructions for each.
+            1 => image.bytes.iter().map(|byte| *byte != 0).collect(),
+            size => {
+                let pixels = image.bytes.chunks_exact(size);
+                let set = |pixel: &[u8]| pixel[..opaque].iter().any(|byte| *byte != 0);
+                pixels.map(set).collect()
+            }
+        };
+        let mask = Mask::new(image.width, image.height, mask);
         mask.map_err(|error| IoError::unusable(path, "mask", error))
     }
 }

@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use hicp_core::Observation;
 use hicp_core::internal::{VectorLoop, median, whole};
+use hicp_core::{Derived, Observation, PixelRegion};
 
 use crate::mve::agreement::all_bits;
 use crate::mve::trust_map::{CERTAIN, TrustMap};
@@ -13,10 +13,12 @@ use crate::tolerances::N_TOLERANCES;
 /// Number of zeros after the last pixel, for loops over many pixels at once.
 pub(crate) const PADDING: usize = 8;
 
-/// The pixels of a decimated observation, without most of the noise.
+/// Every few pixels of an observation, without most of the noise.
 ///
 /// Each of the three lists is row-major and ends with [`PADDING`] zeros.
 pub(crate) struct CoarseGrid {
+    /// The camera of the coarse image.
+    pub(crate) camera: hicp_core::PinholeCamera,
     /// Meters; 0 without a measured depth.
     pub(crate) measured: Vec<f32>,
     /// The certainty that a pixel shows the object, at most [`CoarseGrid::one`].
@@ -32,90 +34,95 @@ pub(crate) struct CoarseGrid {
     pub(crate) seen_through_meters: Option<f64>,
 }
 
+/// The grids of an observation at one resolution.
+#[derive(Default)]
+struct Grids(Derived);
+
 /// Number of pixels along a side of the window whose median is the depth of a coarse pixel.
 ///
 /// They are half a coarse pixel apart.
 const WINDOW: u32 = 5;
 
 impl CoarseGrid {
-    /// Returns the grid of an exact mask. It is built once and shared.
-    pub(crate) fn exact(fine: &Observation, coarse: &Observation) -> Arc<Self> {
-        coarse.derived().get_or_build(0, || {
-            let mask = coarse.mask().pixels();
-            Self {
-                total: coarse.n_measured() as u64,
-                ..Self::new(fine, coarse, |index, _| u32::from(mask[index]))
-            }
-        })
-    }
-
-    /// Returns the grid of an imperfect mask for objects of a diameter in meters.
+    /// Returns the grid of every `factor`-th pixel of every `factor`-th row, from pixel (0, 0).
     ///
-    /// It is built once per diameter and shared.
-    pub(crate) fn imperfect(fine: &Observation, coarse: &Observation, diameter: f64) -> Arc<Self> {
-        coarse.derived().get_or_build(diameter.to_bits(), || {
-            let trust = TrustMap::of(fine, diameter);
-            let grid = Self::new(fine, coarse, |_, (u, v)| u32::from(trust.weight(u, v)));
-            let measured = (grid.weight.iter().zip(&grid.measured)).filter(|(_, z)| **z > 0.0);
-            Self {
-                one: u32::from(CERTAIN),
-                total: measured.map(|(weight, _)| u64::from(*weight)).sum(),
-                seen_through_meters: Some(trust.seen_through_meters()),
-                ..grid
+    /// `imperfect` is the diameter of the object in meters if the mask is imperfect. The grid is
+    /// built once and shared. Cost: O(image / factor²).
+    pub(crate) fn of(fine: &Observation, factor: u32, imperfect: Option<f64>) -> Arc<Self> {
+        let grids: Arc<Grids> = fine.derived().get_or_build(factor.into(), Grids::default);
+        // No diameter has the key of an exact mask.
+        let key = imperfect.map_or(0, f64::to_bits);
+        grids.0.get_or_build(key, || match imperfect {
+            None => Self::new(fine, factor, &fine.region(), |_, masked| masked.into()),
+            Some(diameter) => {
+                let trust = TrustMap::of(fine, diameter);
+                let weight = |(u, v), _| trust.weight(u, v).into();
+                Self {
+                    one: CERTAIN.into(),
+                    seen_through_meters: Some(trust.seen_through_meters()),
+                    ..Self::new(fine, factor, trust.region(), weight)
+                }
             }
         })
     }
 
-    /// Creates a grid with weights for the indices of pixels and for their places in the fine
-    /// image.
+    /// Creates a grid with weights for pixels of a region of the fine image, and their mask.
+    ///
+    /// The mask lies in the region. Outside, weights are 0.
     fn new(
         fine: &Observation,
-        coarse: &Observation,
-        weight: impl Fn(usize, (u32, u32)) -> u32,
+        factor: u32,
+        region: &PixelRegion,
+        weight: impl Fn((u32, u32), bool) -> u32,
     ) -> Self {
-        let (camera, factor) = (coarse.camera(), factor(fine, coarse));
-        let depth = coarse.depth().pixels();
-        let length = depth.len() + PADDING;
-        let mut grid = Self {
-            measured: Vec::with_capacity(length),
-            weight: Vec::with_capacity(length),
-            distance_per_depth: Vec::with_capacity(length),
-            one: 1,
-            total: 0,
-            seen_through_meters: None,
+        let camera = fine.camera().scaled_down(factor);
+        let (width, height) = camera.size();
+        let length = width as usize * height as usize + PADDING;
+        let mut measured = Vec::with_capacity(length);
+        measured.extend_from_slice(fine.depth().decimated(factor).pixels());
+        let mut distance_per_depth = Vec::with_capacity(length);
+        let squared = |pixel: u32, center: f64, focal_length: f64| {
+            let slope = (f64::from(pixel) - center) / focal_length;
+            slope * slope
         };
-        for ((u, v), (index, z)) in camera.region().pixels().zip(depth.iter().enumerate()) {
-            let place = (u * factor, v * factor);
-            grid.measured
-                .push(median_around(fine, place, factor).unwrap_or(*z));
-            grid.weight.push(weight(index, place));
+        let x = (0..width).map(|u| squared(u, camera.cx(), camera.fx()));
+        let x: Vec<f64> = x.collect();
+        for v in 0..height {
+            let y = squared(v, camera.cy(), camera.fy());
             #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
-            let distance = camera.distance_per_depth(u.into(), v.into()) as f32;
-            grid.distance_per_depth.push(distance);
+            distance_per_depth.extend(x.iter().map(|x| (x + y + 1.0).sqrt() as f32));
         }
-        grid.measured.resize(length, 0.0);
-        grid.weight.resize(length, 0);
-        grid.distance_per_depth.resize(length, 0.0);
-        grid
+        measured.resize(length, 0.0);
+        distance_per_depth.resize(length, 0.0);
+        let (mut weights, mut total) = (vec![0; length], 0);
+        for (u, v) in region.decimated(factor).pixels() {
+            let (place, index) = ((u * factor, v * factor), (v * width + u) as usize);
+            let masked = fine.mask().get(place.0, place.1) == Some(true);
+            weights[index] = weight(place, masked);
+            if measured[index] > 0.0 {
+                total += u64::from(weights[index]);
+                if masked && factor > 1 {
+                    measured[index] = median_around(fine, place, factor);
+                }
+            }
+        }
+        Self {
+            camera,
+            measured,
+            weight: weights,
+            distance_per_depth,
+            one: 1,
+            total,
+            seen_through_meters: None,
+        }
     }
 }
 
-/// Returns the factor between the resolutions of the two images.
-fn factor(fine: &Observation, coarse: &Observation) -> u32 {
-    let ratio = fine.camera().fx() / coarse.camera().fx();
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A small whole number.
-    let factor = ratio.round() as u32;
-    factor.max(1)
-}
-
-/// Returns the median depth around a pixel of the mask.
+/// Returns the median depth around a measured pixel of the mask.
 ///
 /// The window is two coarse pixels wide. Only masked pixels count.
-fn median_around(fine: &Observation, (u, v): (u32, u32), factor: u32) -> Option<f32> {
+fn median_around(fine: &Observation, (u, v): (u32, u32), factor: u32) -> f32 {
     let (depth, mask) = (fine.depth(), fine.mask());
-    if factor == 1 || mask.get(u, v) != Some(true) || depth.get(u, v)? <= 0.0 {
-        return None;
-    }
     let mut window = [0.0; (WINDOW * WINDOW) as usize];
     let mut count = 0;
     let offset = |step: u32, from: u32| (from + factor * step / 2).wrapping_sub(factor);
@@ -129,7 +136,7 @@ fn median_around(fine: &Observation, (u, v): (u32, u32), factor: u32) -> Option<
             count += 1;
         }
     }
-    median(&mut window[..count], f32::total_cmp)
+    median(&mut window[..count], f32::total_cmp).unwrap_or(0.0)
 }
 
 /// Number of pixels compared at once.

@@ -1,7 +1,7 @@
 //! The mean VSD estimate from samples of the model instead of a render.
 
 use hicp_core::internal::vectorized;
-use hicp_core::{Context, Isometry3, Observation, PinholeCamera, Problem};
+use hicp_core::{Context, Isometry3, Observation, Problem};
 
 use crate::mve::coarse_grid::{CoarseGrid, CompareCoarse};
 use crate::mve::mask_trust::MaskTrust;
@@ -19,7 +19,7 @@ use crate::tolerances::N_TOLERANCES;
 /// and thin parts may be missed.
 ///
 /// Cost: O(samples) per pose. The points of a side are chosen once per model, in some 0.1 ms, and
-/// shared, and so is the coarse observation.
+/// shared, and so is the coarse image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledMve {
     /// Approximate number of points of a side of the model; 0 scores every pose 1.
@@ -86,7 +86,6 @@ impl SampledMve {
     /// Compares points at a pose with the observation.
     fn compare(
         &mut self,
-        camera: &PinholeCamera,
         blocks: &[Block],
         grid: &CoarseGrid,
         pose: &Isometry3<f64>,
@@ -97,7 +96,7 @@ impl SampledMve {
         }
         let touched = vectorized(Splat {
             blocks,
-            camera,
+            camera: &grid.camera,
             pose,
             buffer: &mut self.buffer,
             drawn: &mut self.drawn,
@@ -111,7 +110,7 @@ impl SampledMve {
         let (per_meter, hidden_beyond) = ((20.0 / diameter) as f32, hidden_beyond as f32);
         let (agreement, outside) = vectorized(CompareCoarse {
             touched,
-            image_width: camera.width() as usize,
+            image_width: grid.camera.width() as usize,
             buffer: &mut self.buffer,
             grid,
             per_meter,
@@ -137,15 +136,11 @@ impl Score for SampledMve {
         let Some((model, observation)) = context.problem.sides() else {
             return 1.0;
         };
-        let coarse = observation.decimated(self.factor(observation));
         let diameter = model.diameter();
-        let grid = match self.mask {
-            MaskTrust::Exact => CoarseGrid::exact(observation, &coarse),
-            MaskTrust::Imperfect => CoarseGrid::imperfect(observation, &coarse, diameter),
-        };
+        let imperfect = (self.mask == MaskTrust::Imperfect).then_some(diameter);
+        let grid = CoarseGrid::of(observation, self.factor(observation), imperfect);
         let blocks = Blocks::of(model, self.samples);
         self.compare(
-            coarse.camera(),
             blocks.facing(camera_from_object),
             &grid,
             camera_from_object,

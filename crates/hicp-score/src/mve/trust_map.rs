@@ -150,6 +150,11 @@ impl TrustMap {
         VISIBILITY_TOLERANCE_METERS.max(2.0 * self.noise)
     }
 
+    /// Returns the region outside which weights are 0.
+    pub(crate) fn region(&self) -> &PixelRegion {
+        &self.region
+    }
+
     /// Returns the sum of the weights of measured pixels.
     pub(crate) fn total(&self) -> u64 {
         self.total
