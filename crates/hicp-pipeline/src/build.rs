@@ -98,14 +98,15 @@ impl<'a> Context<'a> {
         let mut entries = self.entries.iter();
         let Some(entry) = entries.find(|e| e.part.kind == K::KIND && e.part.name == name) else {
             let problem = format!("no {} is named {name:?}", K::KIND.name());
-            return Err(self.unknown(spot, problem, name, self.names(K::KIND)));
+            return Err(self.unknown(spot, problem, (name, None), self.names(K::KIND)));
         };
         let known = || entry.part.parameters.iter().map(|p| p.name);
         for field in fields.names() {
             if field != "type" && !known().any(|name| name == field) {
                 let problem = format!("{name} has no such field");
                 let (_, spot) = fields.field(field);
-                return Err(self.unknown(&spot, problem, field, known().collect()));
+                let nested = fields.nested(field);
+                return Err(self.unknown(&spot, problem, (field, nested), known().collect()));
             }
         }
         let mut parameters = Parameters {
@@ -148,13 +149,14 @@ impl<'a> Context<'a> {
         &self,
         spot: &Spot,
         problem: String,
-        name: &str,
+        (name, elsewhere): (&str, Option<String>),
         known: Vec<&'static str>,
     ) -> PipelineError {
+        let nearest = nearest_name(name, known.iter().copied());
         PipelineError::Unknown {
             place: spot.place(self.origin, self.text),
             problem,
-            suggestion: nearest_name(name, known.iter().copied()).map(str::to_owned),
+            suggestion: nearest.map(str::to_owned).or(elsewhere),
             known: known.into_iter().map(str::to_owned).collect(),
         }
     }

@@ -77,7 +77,7 @@ pub enum PipelineError {
         place: Box<Place>,
         /// The message: the unknown name and its kind.
         problem: String,
-        /// The known name nearest to it.
+        /// The known name nearest to it, or the path of such a field in an inner part.
         suggestion: Option<String>,
         /// The known names.
         known: Vec<String>,

@@ -50,6 +50,12 @@ impl<'a> Fields<'a> {
         keys.map(|key| key.get_ref().as_ref())
     }
 
+    /// Returns the path of a field of this name in an inner part, if one is given.
+    pub(crate) fn nested(&self, name: &str) -> Option<String> {
+        let mut fields = self.given?.iter();
+        fields.find_map(|(key, value)| find(value.get_ref(), key.get_ref(), name))
+    }
+
     /// Returns a field, if it is given, and where it stands. The place of a field that is not given
     /// is that of its part; that of one that is given is its key, where a person looks.
     pub(crate) fn field(&self, name: &str) -> (Option<&'a DeValue<'a>>, Spot) {
@@ -61,5 +67,21 @@ impl<'a> Fields<'a> {
         };
         let value = given.map(|(_, value)| Spanned::get_ref(value));
         (value, self.spot.inside(name, start))
+    }
+}
+
+/// Returns the path of the first field of this name in a value at a path.
+fn find(value: &DeValue<'_>, path: &str, name: &str) -> Option<String> {
+    match value {
+        DeValue::Table(table) if table.contains_key(name) => Some(format!("{path}.{name}")),
+        DeValue::Table(table) => table.iter().find_map(|(key, value)| {
+            let path = format!("{path}.{}", key.get_ref());
+            find(value.get_ref(), &path, name)
+        }),
+        DeValue::Array(list) => list.iter().enumerate().find_map(|(index, value)| {
+            let path = format!("{path}.{index}");
+            find(value.get_ref(), &path, name)
+        }),
+        _ => None,
     }
 }

@@ -146,6 +146,10 @@ fn messages_name_the_line_the_field_and_the_expected_value() {
             "my.toml:5: filtr: icp has no such field; did you mean \"filter\"?",
         ),
         (
+            format!("{icp}filter = [{{ type = \"max-distance\", limit = 1 }}]\nlimit = 2\n"),
+            "my.toml:6: limit: icp has no such field; did you mean \"filter.0.limit\"?",
+        ),
+        (
             icp.replace("metric", "# metric"),
             "my.toml:1: metric: missing, expected a metric: point-to-point",
         ),
