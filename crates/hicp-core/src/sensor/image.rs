@@ -201,6 +201,7 @@ impl DepthImage {
 }
 
 /// Returns the depth if it counts as measured, otherwise 0.
+#[inline]
 fn measured(z: f32) -> f32 {
     if (MIN_DEPTH_METERS..=MAX_DEPTH_METERS).contains(&z) {
         z

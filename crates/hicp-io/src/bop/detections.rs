@@ -62,15 +62,18 @@ impl ReadLimits {
     ///
     /// As for [`read_detections`].
     pub fn read_detections(&self, path: impl AsRef<Path>) -> Result<Vec<Detection>, IoError> {
-        let read = json::read(self, path.as_ref(), Limit::JSON_BYTES);
-        read.map_err(|mut error: IoError| {
-            let at_root = error.place == Some(Place::Field("$".to_owned()));
-            if at_root && error.found == "an object" {
-                error.expected = FROM_COCO.to_owned();
-            }
-            error
-        })
+        read(self, path.as_ref())
     }
+}
+
+fn read(limits: &ReadLimits, path: &Path) -> Result<Vec<Detection>, IoError> {
+    json::read(limits, path, Limit::JSON_BYTES).map_err(|mut error: IoError| {
+        let at_root = error.place == Some(Place::Field("$".to_owned()));
+        if at_root && error.found == "an object" {
+            error.expected = FROM_COCO.to_owned();
+        }
+        error
+    })
 }
 
 #[cfg(test)]

@@ -55,10 +55,15 @@ impl ReadLimits {
 ///
 /// As for [`write_atomically`](crate::write_atomically).
 pub fn write_mask_png(path: impl AsRef<Path>, mask: &Mask) -> Result<(), IoError> {
-    let bytes = mask.pixels().iter().map(|set| u8::from(*set) * 255);
-    let bytes: Vec<u8> = bytes.collect();
     let kind = (ColorType::Grayscale, BitDepth::Eight);
-    pixels::write(path.as_ref(), mask.size(), kind, &bytes)
+    pixels::write(path.as_ref(), mask.size(), kind, &bytes_of(mask))
+}
+
+fn bytes_of(mask: &Mask) -> Vec<u8> {
+    mask.pixels()
+        .iter()
+        .map(|set| u8::from(*set) * 255)
+        .collect()
 }
 
 #[cfg(test)]

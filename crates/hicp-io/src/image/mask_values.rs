@@ -68,8 +68,14 @@ impl ReadLimits {
     /// As for [`read_mask`].
     pub fn read_mask(&self, path: impl AsRef<Path>, rule: MaskRule) -> Result<MaskFile, IoError> {
         let path = path.as_ref();
-        let image = decode::read(self, path, EXPECTED)?;
-        let values = values(&image);
+        MaskFile::of(path, &decode::read(self, path, EXPECTED)?, rule)
+    }
+}
+
+impl MaskFile {
+    /// Returns the mask of an image from a file.
+    fn of(path: &Path, image: &Raster, rule: MaskRule) -> Result<Self, IoError> {
+        let values = values(image);
         let background = image.background.as_deref().unwrap_or_default();
         let is_background = |value: f64| {
             background
@@ -105,11 +111,10 @@ impl ReadLimits {
         }
         let mask = Mask::new(image.width, image.height, pixels);
         let mask = mask.map_err(|error| IoError::unusable(path, "mask", error))?;
-        let values = distinct;
-        Ok(MaskFile {
+        Ok(Self {
             mask,
             warning,
-            values,
+            values: distinct,
             threshold,
         })
     }

@@ -77,6 +77,9 @@ pub(super) fn check_size(
 
 /// Unpacks samples of 1, 2, 4 or 8 bits, whose rows start at whole bytes.
 pub(super) fn unpack(bytes: &[u8], row_samples: usize, bits: usize) -> Vec<f32> {
+    if bits == 8 {
+        return bytes.iter().map(|byte| f32::from(*byte)).collect();
+    }
     let row_bytes = (row_samples * bits).div_ceil(8).max(1);
     let sample = |row: &[u8], index: usize| {
         let shift = 8 - bits - index * bits % 8;
