@@ -1,9 +1,10 @@
 //! Near symmetries: motions that map most of an object's surface onto itself.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use hicp_core::internal::small::eigen3;
-use hicp_core::internal::{VectorLoop, centroid, vectorized};
+use hicp_core::internal::{VectorLoop, bounds, centroid, vectorized};
 use hicp_core::{
     Isometry3, Matrix3, Model, Observation, RigidTransform, Surfel, Translation3, TriMesh,
     UnitQuaternion, UnitVector3, Vector3,
@@ -27,7 +28,7 @@ const LEAST_MOTION: f64 = 0.05;
 const ALIGNMENTS: usize = 3;
 const STRIDE: usize = 3;
 /// Cosines of the angles by which a principal axis is corrected: 2° to 37°.
-const TILTED: std::ops::Range<f64> = 0.8..0.9995;
+const TILTED: Range<f64> = 0.8..0.9995;
 /// Share of the seen samples that must tell two poses apart.
 const TELLING: f64 = 0.03;
 
@@ -158,10 +159,7 @@ impl NearSymmetries {
             let mut bare = Set::default();
             for (index, sample) in samples.iter().enumerate() {
                 let point = (back * sample.point).coords;
-                if columns
-                    .nearest(&point, None, 9.0 * tolerance * tolerance)
-                    .is_none()
-                {
+                if columns.nearest(&point, None, 3.0 * tolerance).is_none() {
                     bare[index / 64] |= 1 << (index % 64);
                 }
             }
@@ -270,8 +268,7 @@ fn residual(
     (samples, columns): (&[Surfel], &Columns),
     tolerance: f32,
 ) -> Option<Vector3<f32>> {
-    let limit = 9.0 * tolerance * tolerance;
-    let nearest = columns.nearest(&moved.point.coords, Some(&moved.normal), limit)?;
+    let nearest = columns.nearest(&moved.point.coords, Some(&moved.normal), 3.0 * tolerance)?;
     let nearest = &samples[nearest];
     // Samples do not lie on samples, so only the distance along the normal counts.
     let along = nearest.normal.dot(&(nearest.point - moved.point));
@@ -280,46 +277,75 @@ fn residual(
 
 /// The coordinates of the samples and of their normals, for whole vectors. Those that are missing
 /// are infinitely far away.
-struct Columns([[f32; SAMPLES]; 6]);
+struct Columns {
+    numbers: [[f32; SAMPLES]; 6],
+    /// The coordinate by which the samples are sorted.
+    axis: usize,
+    /// The index of each sample.
+    samples: Vec<usize>,
+}
 
 impl Columns {
     fn new(samples: &[Surfel]) -> Self {
-        let mut columns = [[f32::INFINITY; SAMPLES]; 6];
-        for (place, sample) in samples.iter().enumerate() {
+        let bounds = bounds(samples.iter().map(|sample| sample.point));
+        let axis = bounds.map_or(0, |[low, high]| (high - low).imax());
+        let mut order: Vec<usize> = (0..samples.len()).collect();
+        order.sort_by(|a, b| samples[*a].point[axis].total_cmp(&samples[*b].point[axis]));
+        let mut numbers = [[f32::INFINITY; SAMPLES]; 6];
+        for (place, index) in order.iter().enumerate() {
+            let sample = &samples[*index];
             for axis in 0..3 {
-                columns[axis][place] = sample.point[axis];
-                columns[3 + axis][place] = sample.normal[axis];
+                numbers[axis][place] = sample.point[axis];
+                numbers[3 + axis][place] = sample.normal[axis];
             }
         }
-        Self(columns)
+        Self {
+            numbers,
+            axis,
+            samples: order,
+        }
     }
 
-    /// Returns the nearest sample within a squared distance, of a similar normal if one is given.
+    /// Returns the nearest sample within a distance, of a similar normal if one is given.
     fn nearest(
         &self,
         point: &Vector3<f32>,
         normal: Option<&Vector3<f32>>,
-        limit: f32,
+        radius: f32,
     ) -> Option<usize> {
         // Without a normal, every one is similar.
         let (normal, least) = normal.map_or((Vector3::zeros(), -1.0), |normal| (*normal, 0.5));
-        vectorized(Nearest {
-            columns: &self.0,
+        let sorted = &self.numbers[self.axis];
+        let [first, end] = [-SLAB, SLAB]
+            .map(|slab| sorted.partition_point(|x| *x < point[self.axis] + slab * radius));
+        let place = vectorized(Nearest {
+            columns: &self.numbers,
+            blocks: first / LANES..end.div_ceil(LANES),
             point: *point,
             normal,
             least,
-            limit,
-        })
+            limit: radius * radius,
+        });
+        place.map(|place| self.samples[place])
     }
 }
+
+/// Half the width of the slab that is searched, in radii. Roundings are far smaller.
+const SLAB: f32 = 1.01;
+
+/// Number of samples compared at once.
+const LANES: usize = 16;
 
 /// The loop that finds the nearest sample.
 struct Nearest<'a> {
     columns: &'a [[f32; SAMPLES]; 6],
+    /// The blocks of [`LANES`] samples that are compared.
+    blocks: Range<usize>,
     point: Vector3<f32>,
     normal: Vector3<f32>,
     /// The cosine above which normals are similar.
     least: f32,
+    /// The square of the largest distance.
     limit: f32,
 }
 
@@ -328,27 +354,23 @@ impl VectorLoop for Nearest<'_> {
 
     #[inline(always)]
     fn run(self) -> Option<usize> {
-        let [x, y, z, nx, ny, nz] = self.columns;
         let (point, normal) = (&self.point, &self.normal);
-        let mut distances = [0.0_f32; SAMPLES];
-        for place in 0..SAMPLES {
-            let (dx, dy, dz) = (x[place] - point.x, y[place] - point.y, z[place] - point.z);
-            let along = nx[place] * normal.x + ny[place] * normal.y + nz[place] * normal.z;
-            let distance = dx * dx + dy * dy + dz * dz;
-            distances[place] = if along > self.least {
-                distance
-            } else {
-                f32::INFINITY
-            };
-        }
-        let mut lanes = [f32::INFINITY; 16];
-        for distances in distances.chunks_exact(16) {
-            for (lane, distance) in lanes.iter_mut().zip(distances) {
-                *lane = if *distance < *lane { *distance } else { *lane };
+        let (mut least, mut blocks) = ([self.limit; LANES], [0_u32; LANES]);
+        for (number, block) in (1..).zip(self.blocks.clone()) {
+            let columns = self.columns.each_ref();
+            let [x, y, z, nx, ny, nz] = columns.map(|column| &column.as_chunks::<LANES>().0[block]);
+            for lane in 0..LANES {
+                let (dx, dy, dz) = (x[lane] - point.x, y[lane] - point.y, z[lane] - point.z);
+                let along = nx[lane] * normal.x + ny[lane] * normal.y + nz[lane] * normal.z;
+                let distance = dx * dx + dy * dy + dz * dz;
+                let nearer = (along > self.least) & (distance < least[lane]);
+                least[lane] = if nearer { distance } else { least[lane] };
+                blocks[lane] = if nearer { number } else { blocks[lane] };
             }
         }
-        let nearest = lanes.into_iter().fold(f32::INFINITY, f32::min);
-        let found = nearest < self.limit;
-        found.then(|| distances.iter().position(|d| *d == nearest))?
+        let lanes = 0..LANES;
+        let lane = lanes.reduce(|a, b| if least[b] < least[a] { b } else { a })?;
+        let block = (blocks[lane] as usize).checked_sub(1)?;
+        Some((self.blocks.start + block) * LANES + lane)
     }
 }
