@@ -108,8 +108,15 @@ fn dependencies(manifest: &str) -> impl Iterator<Item = &str> {
         .filter(|name| !name.is_empty() && !name.starts_with('#'))
 }
 
-/// Checks that the documentation of a library says whether to use it and shows an example.
+/// The files that each published crate needs, as links or of its own.
+const FILES: [&str; 3] = ["LICENSE-APACHE", "LICENSE-MIT", "README.md"];
+
+/// Checks that a crate has its files, and that the documentation of a library says whether to use
+/// it and shows an example.
 fn documentation(name: &str, findings: &mut Vec<String>) {
+    let folder = Path::new("crates").join(name);
+    let missing = FILES.iter().filter(|file| !folder.join(file).is_file());
+    findings.extend(missing.map(|file| format!("crates/{name}: no {file}")));
     let file = format!("crates/{name}/src/lib.rs");
     let Ok(text) = read(&file) else { return };
     for part in ["Should you use this crate?", "//! ```"] {
