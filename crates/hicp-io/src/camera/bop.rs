@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 
-use super::distortion::Distortion;
+use super::distortion::{COEFFICIENTS, Distortion, is_distortion};
 use super::model::CameraModel;
 use crate::error::{IoError, IoErrorKind, Place};
 use crate::json::{self, ById, Numbers, Positive};
@@ -27,7 +27,7 @@ pub struct CameraFile {
     pub distortion: Option<Distortion>,
 }
 
-/// Returns whether a JSON value has the form of BOP's cameras.
+/// Returns whether a JSON value has the form of BOP's cameras, which are without distortion.
 pub(super) fn is_bop(root: &Value) -> bool {
     let Value::Object(members) = root else {
         return false;
@@ -38,10 +38,17 @@ pub(super) fn is_bop(root: &Value) -> bool {
         Some(Value::Object(first)) if of_images => first,
         _ => members,
     };
+    let has_name = |key: &&str| camera.get(*key).is_some_and(|value| !value.is_null());
+    let is_distorted = COEFFICIENTS.iter().any(has_name)
+        || camera.iter().any(|(key, value)| is_distortion(key, value));
+    if camera.contains_key("cam_model") {
+        return true;
+    }
+    if is_distorted {
+        return false;
+    }
     let flat = ["fx", "fy", "cx", "cy", "width", "height"];
-    ["cam_K", "cam_model"]
-        .iter()
-        .any(|key| camera.contains_key(*key))
+    camera.contains_key("cam_K")
         || (flat.iter().all(|key| camera.contains_key(*key)) && !camera.contains_key("ppx"))
 }
 

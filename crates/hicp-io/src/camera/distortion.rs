@@ -2,7 +2,26 @@
 
 use hicp_core::{ColorImage, DepthImage, Mask, PinholeCamera, PixelRegion};
 
+use serde_json::Value;
+
 use crate::number::whole;
+
+/// The keys of coefficients that a file states one by one, in OpenCV's order.
+pub(super) const COEFFICIENTS: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+
+/// Returns whether a member holds coefficients of a distortion: a list or an object under any of the
+/// names that programs use.
+pub(super) fn is_distortion(key: &str, value: &Value) -> bool {
+    let name = key.to_lowercase().replace('_', "");
+    let is_known = matches!(&*name, "d" | "coeffs" | "dist" | "kc")
+        || name.starts_with("distortion")
+        || name.starts_with("distcoef");
+    let is_stated = match value {
+        Value::Array(items) => !items.is_empty(),
+        value => value.is_object() || value.is_number(),
+    };
+    is_known && is_stated
+}
 
 /// A lens distortion: where the ray through a point of the ideal image plane really hits the image.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@ use hicp_core::{Matrix3, PinholeCamera};
 use serde_json::Value;
 
 use super::bop::{CameraFile, is_bop, number_of};
-use super::distortion::Distortion;
+use super::distortion::{COEFFICIENTS, Distortion, is_distortion};
 use crate::document::{self, numbers};
 use crate::error::{IoError, IoErrorKind, Place, quote};
 use crate::limits::ReadLimits;
@@ -14,11 +14,15 @@ use crate::limits::ReadLimits;
 const EXPECTED: &str = "a camera as JSON, YAML, XML, text or NPY";
 
 /// The keys of a calibration matrix, and of numbers under several names.
-const MATRIX: [&str; 7] = [
+const MATRIX: [&str; 11] = [
     "cam_K",
     "K",
     "k",
     "camera_matrix",
+    "cameraMatrix",
+    "CameraMatrix",
+    "Camera_Matrix",
+    "mtx",
     "intrinsic_matrix",
     "intrinsics",
     "intrinsic",
@@ -30,14 +34,6 @@ const CY: [&str; 5] = ["cy", "ppy", "pp_y", "c_y", "principal_point_y"];
 const FLAT: [[&str; 5]; 4] = [FX, FY, CX, CY];
 const WIDTH: [&str; 3] = ["width", "image_width", "w"];
 const HEIGHT: [&str; 3] = ["height", "image_height", "h"];
-const DISTORTION: [&str; 6] = [
-    "D",
-    "d",
-    "distortion_coefficients",
-    "dist_coeffs",
-    "coeffs",
-    "distortion",
-];
 const MODEL: [&str; 3] = ["distortion_model", "model", "camera_model"];
 
 /// Reads a camera for images of `image_size` (width, height) in pixels, in any common form.
@@ -52,7 +48,8 @@ const MODEL: [&str; 3] = ["distortion_model", "model", "camera_model"];
 /// - Open3D's `intrinsic_matrix`.
 ///
 /// `depth_scale` is in millimeters per unit; next to `ppx` or `f_u`, it is in meters per unit, as
-/// those programs write it. Distortions whose numbers are all 0 are dropped.
+/// those programs write it. Distortions whose numbers are all 0 are dropped. BOP's forms may state one,
+/// too.
 ///
 /// # Errors
 ///
@@ -138,6 +135,41 @@ impl Form<'_> {
     fn refuse(&self, name: &str, found: impl Into<String>, expected: &str) -> IoError {
         let place = Place::Field(format!("{}{name}", self.key));
         IoError::new(self.path, place, found, expected)
+    }
+
+    /// Returns the coefficients of the distortion and their key.
+    fn coefficients(&self) -> Result<(String, Vec<f64>), IoError> {
+        let both = [self.camera, self.root].into_iter();
+        let mut members = both.filter_map(Value::as_object).flatten();
+        let Some((key, value)) = members.find(|(key, value)| is_distortion(key, value)) else {
+            let numbers = self.named(|name| self.member(&[name]).map(|(_, value)| value), "")?;
+            return Ok(("k1".to_owned(), numbers));
+        };
+        let found = || quote(&value.to_string());
+        match numbers(value) {
+            Some(numbers) => Ok((key.clone(), numbers)),
+            None if COEFFICIENTS.iter().any(|name| value.get(name).is_some()) => {
+                let numbers = self.named(|name| value.get(name), &format!(".{key}"))?;
+                Ok((key.clone(), numbers))
+            }
+            None => Err(self.refuse(&format!(".{key}"), found(), "a list of finite numbers")),
+        }
+    }
+
+    /// Returns the coefficients that have keys of their own. The others are 0.
+    fn named<'v>(
+        &self,
+        member: impl Fn(&'static str) -> Option<&'v Value>,
+        key: &str,
+    ) -> Result<Vec<f64>, IoError> {
+        let number = |name: &&'static str| match member(name).filter(|value| !value.is_null()) {
+            None => Ok(0.0),
+            Some(value) => value.as_f64().ok_or_else(|| {
+                let found = quote(&value.to_string());
+                self.refuse(&format!("{key}.{name}"), found, "a finite number")
+            }),
+        };
+        COEFFICIENTS.iter().map(number).collect()
     }
 
     /// Returns the member of the first key that the camera or the file has.
@@ -240,15 +272,9 @@ impl Form<'_> {
     }
 
     fn distortion(&self) -> Result<Option<Distortion>, IoError> {
-        let stated = self.member(&DISTORTION);
-        let stated = stated.and_then(|(key, value)| Some((key, numbers(value)?)));
+        let (key, mut k) = self.coefficients()?;
         let model = self.member(&MODEL).and_then(|(_, name)| name.as_str());
         let model = model.unwrap_or_default();
-        let (key, mut k) = stated.unwrap_or_else(|| {
-            let names = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
-            let numbers = names.map(|name| self.number(&[name]).unwrap_or(0.0));
-            ("k1", numbers.to_vec())
-        });
         if k.iter().all(|k| *k == 0.0) {
             return Ok(None);
         }

@@ -55,6 +55,71 @@ fn distortions_are_read_with_their_models() {
 }
 
 #[test]
+fn a_distortion_is_read_next_to_every_form_of_a_camera() {
+    let folder = Folder::new();
+    let read = |text: &str| read_camera(folder.write("camera.json", text), (640, 480));
+    let matrix = "[600, 0, 320.5, 0, 610, 240.25, 0, 0, 1]";
+    let flat = r#""fx": 600, "fy": 610, "cx": 320.5, "cy": 240.25, "width": 640, "height": 480"#;
+    let cameras = [
+        format!(r#""cam_K": {matrix}, "depth_scale": 0.1"#),
+        format!(r#""cameraMatrix": {matrix}"#),
+        flat.to_owned(),
+    ];
+    let expected = Distortion::BrownConrady([0.1, -0.2, 0.001, 0.002, 0.0, 0.0, 0.0, 0.0]);
+    for camera in &cameras {
+        for key in [
+            "D",
+            "dist_coeffs",
+            "distCoeffs",
+            "distortion_coeffs",
+            "dist",
+            "kc",
+        ] {
+            let file = read(&format!(
+                r#"{{{camera}, "{key}": [0.1, -0.2, 0.001, 0.002]}}"#
+            ));
+            assert_eq!(file.unwrap().distortion, Some(expected), "{camera} {key}");
+        }
+        for distortion in [
+            r#""k1": 0.1, "k2": -0.2, "p1": 0.001, "p2": 0.002"#,
+            r#""distortion": {"k1": 0.1, "k2": -0.2, "p1": 0.001, "p2": 0.002}"#,
+        ] {
+            let file = read(&format!("{{{camera}, {distortion}}}")).unwrap();
+            assert_eq!(file.distortion, Some(expected), "{camera} {distortion}");
+        }
+        for none in [
+            r#""D": null"#,
+            r#""D": []"#,
+            r#""D": [0, 0, 0, 0, 0]"#,
+            r#""k1": null"#,
+        ] {
+            let file = read(&format!("{{{camera}, {none}}}")).unwrap();
+            assert_eq!(file.distortion, None, "{camera} {none}");
+        }
+        for (wrong, place) in [
+            (r#""D": [0.3, "x", 0, 0, 0]"#, "$.D:"),
+            (r#""distortion": {"model": "radtan"}"#, "$.distortion:"),
+            (r#""distortion": {"k1": "0.3"}"#, "$.distortion.k1:"),
+            (r#""k1": "0.3""#, "$.k1:"),
+        ] {
+            refused(
+                read(&format!("{{{camera}, {wrong}}}")),
+                &[place, "finite number"],
+            );
+        }
+    }
+    let file = read(&format!(
+        r#"{{"7": {{{}, "D": [0.1, -0.2, 0.001, 0.002]}}}}"#,
+        cameras[0]
+    ));
+    let file = file.unwrap();
+    assert_eq!(
+        (file.distortion, file.depth_scale),
+        (Some(expected), Some(0.1))
+    );
+}
+
+#[test]
 fn distorted_points_agree_with_opencv() {
     let text = std::fs::read_to_string(fixture("distorted.json")).unwrap();
     let rows: std::collections::BTreeMap<String, Vec<[f64; 2]>> =

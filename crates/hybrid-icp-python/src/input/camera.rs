@@ -110,9 +110,9 @@ impl PyCamera {
         let file = file.map_err(errors::file)?;
         match file.distortion {
             None => Ok(Self(file.camera)),
-            Some(distortion) => Err(FileError::new_err(format!(
-                "{}: found {distortion:?}, expected no distortion: undistort the images first, \
-                 with nearest-neighbor interpolation for depth, and use Camera.from_K",
+            Some(_) => Err(FileError::new_err(format!(
+                "{}: found lens distortion, expected none: undistort the images first, with \
+                 nearest-neighbor interpolation for depth, and use Camera.from_K",
                 path.display()
             ))),
         }
