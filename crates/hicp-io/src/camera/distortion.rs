@@ -9,8 +9,8 @@ use crate::number::whole;
 /// The keys of coefficients that a file states one by one, in OpenCV's order.
 pub(super) const COEFFICIENTS: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
 
-/// Returns whether a member holds coefficients of a distortion: a list or an object under any of the
-/// names that programs use.
+/// Returns whether a member holds coefficients of a distortion: a list or an object under any of
+/// the names that programs use.
 pub(super) fn is_distortion(key: &str, value: &Value) -> bool {
     let name = key.to_lowercase().replace('_', "");
     let is_known = matches!(&*name, "d" | "coeffs" | "dist" | "kc")

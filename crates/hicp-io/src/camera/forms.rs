@@ -48,8 +48,8 @@ const MODEL: [&str; 3] = ["distortion_model", "model", "camera_model"];
 /// - Open3D's `intrinsic_matrix`.
 ///
 /// `depth_scale` is in millimeters per unit; next to `ppx` or `f_u`, it is in meters per unit, as
-/// those programs write it. Distortions whose numbers are all 0 are dropped. BOP's forms may state one,
-/// too.
+/// those programs write it. Distortions whose numbers are all 0 are dropped. BOP's forms may state
+/// one, too.
 ///
 /// # Errors
 ///
