@@ -68,7 +68,7 @@ pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, 
     }
     let count = header.points;
     reading.check(Limit::VERTICES, place.clone(), count)?;
-    let mut points = Points::new(reading, fields.iter().all(Option::is_some));
+    let mut points = Points::new(reading);
     let body = &content[at..];
     let promise = |bytes_per_point: usize, available: u64| {
         let needed = (count as u64).saturating_mul(bytes_per_point as u64);

@@ -2,45 +2,25 @@
 
 use std::path::Path;
 
-use hicp_core::{Point3, UnitVector3, Vector3};
+use hicp_core::{Point3, UnitVector3};
 
-use super::points::PointCloud;
+use super::points::{PointCloud, no_points, normal_of};
 use crate::error::IoError;
 use crate::mesh::ply;
 use crate::mesh::raw::Reading;
 use crate::unit::LengthUnit;
 
 /// Parses the vertices of an ASCII or binary PLY file. Faces and other elements are skipped.
-///
-/// In a file with normals, so are vertices without one.
 pub(super) fn parse(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, IoError> {
     let unit = reading.unit.units_per_meter();
     let raw = ply::parse_points(reading, content)?;
+    if raw.vertices.is_empty() && raw.n_skipped > 0 {
+        return Err(no_points(reading.path));
+    }
     let points = raw.vertices.iter().map(|p| (p / unit).cast::<f32>());
-    // A file has normals for all vertices or for none.
-    if raw.normals.iter().all(|n| n.iter().all(|x| x.is_nan())) {
-        return Ok(PointCloud {
-            points: points.collect(),
-            normals: None,
-            n_skipped: 0,
-        });
-    }
-    let normal = |n: &Vector3<f64>| UnitVector3::try_new(n.cast::<f32>(), 1e-6);
-    let normals = raw.normals.iter().map(normal);
-    let is_finite = |n: &UnitVector3<f32>| n.iter().all(|x| x.is_finite());
-    let surfels = points.zip(normals);
-    let surfels = surfels.filter_map(|(p, n)| Some((p, n.filter(is_finite)?)));
-    let (points, normals): (Vec<_>, _) = surfels.unzip();
-    if points.is_empty() {
-        let expected = "finite numbers that are not all 0";
-        let found = "no vertex with a normal";
-        return Err(IoError::new(reading.path, None, found, expected));
-    }
-    Ok(PointCloud {
-        n_skipped: raw.vertices.len() - points.len(),
-        points,
-        normals: Some(normals),
-    })
+    let normals = raw.normals.iter().map(|normal| normal_of((*normal).into()));
+    let points: Vec<_> = points.zip(normals).collect();
+    Ok(PointCloud::of(&points, raw.n_skipped))
 }
 
 /// Writes a point cloud as binary little-endian PLY, in meters.
@@ -75,6 +55,8 @@ pub fn write_point_cloud_ply(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hicp_core::Vector3;
+
     use crate::read_cloud;
 
     #[test]
@@ -111,15 +93,17 @@ mod tests {
 
     /// Meshes of scans have normals of length 0 where triangles are degenerate.
     #[test]
-    fn vertices_without_a_normal_are_skipped() {
+    fn vertices_without_a_normal_or_a_position_are_skipped() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.ply");
         let header = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
                       property float z\nproperty float nx\nproperty float ny\nproperty float nz\n\
                       end_header\n";
-        let vertices = "0 0 1 0 0 1\n0 0 2 0 1e-7 0\n0 0 3 nan 0 0\n0 0 4 0 2 0\n";
-        std::fs::write(&path, format!("{header}{vertices}")).unwrap();
-        let cloud = read_cloud(&path, LengthUnit::Meters).unwrap();
+        let read = |vertices: &str| {
+            std::fs::write(&path, format!("{header}{vertices}")).unwrap();
+            read_cloud(&path, LengthUnit::Meters).unwrap()
+        };
+        let cloud = read("0 0 1 0 0 1\n0 0 2 0 1e-7 0\n0 0 3 nan 0 0\n0 0 4 0 2 0\n");
         assert_eq!(
             cloud.points,
             [Point3::new(0.0, 0.0, 1.0), Point3::new(0.0, 0.0, 4.0)]
@@ -127,6 +111,13 @@ mod tests {
         assert_eq!(
             cloud.normals.unwrap(),
             [Vector3::z_axis(), Vector3::y_axis()]
+        );
+        assert_eq!(cloud.n_skipped, 2);
+        // If no vertex has a normal, none is needed. One without a position is skipped.
+        let cloud = read("0 0 1 0 0 0\n0 0 2 nan nan nan\n0 inf 3 0 0 0\nnan 0 4 0 0 0\n");
+        assert_eq!(
+            (cloud.points.len(), cloud.normals, cloud.n_skipped),
+            (2, None, 2)
         );
     }
 
@@ -141,7 +132,6 @@ mod tests {
         ));
         for (names, body) in [
             ("x y z", "0 nan 0"),
-            ("x y z nx ny nz", "0 0 0 0 0 0"),
             // The same file is readable as a mesh, which has no normals.
             ("x y z nx ny nz", "0 0 0 0 0 -nan(ind)"),
         ] {

@@ -22,15 +22,15 @@ const EXPECTED: &str = "a point cloud as PLY, PCD, XYZ, CSV or NPY";
 ///   columns may come first.
 /// - NPY and NPZ: an array whose last axis has the coordinates.
 ///
-/// Columns 4 to 6 without names are normals if all of them have length 1. Except in PLY files,
-/// points that are not finite are skipped, as sensors write them where nothing was measured.
+/// Columns 4 to 6 without names are normals if all of them have length 1. Points that are not
+/// finite are skipped, as sensors write them where nothing was measured. So are those without a
+/// normal, such as (0, 0, 0), if others have one. If none has one, the cloud has no normals.
 ///
 /// # Errors
 ///
 /// [`IoError`] names the file and the place of the fault: a malformed or truncated file, more
 /// points than [`ReadLimits::DEFAULT`] allows or than the file holds, a coordinate beyond
-/// `hicp_core::MAX_COORDINATE_METERS`, a normal in a PLY file that has no direction, or no points
-/// (never for PLY).
+/// `hicp_core::MAX_COORDINATE_METERS`, or no points (except for a PLY file that announces none).
 pub fn read_cloud(path: impl AsRef<Path>, unit: LengthUnit) -> Result<PointCloud, IoError> {
     ReadLimits::DEFAULT.read_cloud(path, unit)
 }

@@ -88,9 +88,13 @@ fn collect(
             .filter(|(_, row)| row[..3].iter().all(|x| x.is_finite()))
     };
     let normals = named || measured().all(|(_, row)| is_unit(row));
-    let mut points = Points::new(reading, normals && !rows.is_empty());
+    let mut points = Points::new(reading);
     for (place, row) in rows {
-        points.add(place.clone(), row)?;
+        let mut row = *row;
+        if !normals {
+            row[3..].fill(f64::NAN);
+        }
+        points.add(place.clone(), &row)?;
     }
     points.finish()
 }

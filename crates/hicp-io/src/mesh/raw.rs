@@ -56,6 +56,8 @@ pub(crate) struct RawMesh<'a> {
     pub(crate) vertices: Vec<Point3<f64>>,
     /// The normals of a point cloud.
     pub(crate) normals: Vec<Vector3<f64>>,
+    /// Number of points of a point cloud that were skipped.
+    pub(crate) n_skipped: usize,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) colors: Colors,
     /// The triangles of the last face, as places among its corners.
@@ -77,6 +79,7 @@ impl<'a> RawMesh<'a> {
             reading,
             vertices: Vec::new(),
             normals: Vec::new(),
+            n_skipped: 0,
             triangles: Vec::new(),
             colors: Colors::default(),
             places: Vec::new(),

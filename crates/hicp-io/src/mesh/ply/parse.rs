@@ -37,6 +37,8 @@ pub(crate) fn parse_mesh(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMe
 }
 
 /// Parses the vertices of a PLY file with their normals, which are NaN if the file has none.
+///
+/// Vertices without a position are skipped.
 pub(crate) fn parse_points<'a>(
     reading: Reading<'a>,
     content: &[u8],
@@ -143,6 +145,10 @@ fn read_vertices(
         }
         let [x, y, z, nx, ny, nz, red, green, blue, s, t] = vertex;
         if !with_faces {
+            if ![x, y, z].iter().all(|number| number.is_finite()) {
+                mesh.n_skipped += 1;
+                return Ok(());
+            }
             mesh.normals.push(Vector3::new(nx, ny, nz));
         }
         if colored {
