@@ -72,8 +72,8 @@ const EXPECTED: &str = "a depth image as PNG, TIFF, NPY, NPZ, EXR, PGM or PFM";
 ///
 /// 0, NaN, infinity and negative numbers mean missing, and so does 65535 in 16 bits.
 /// `millimeters_per_unit` is the depth of one unit. `None` means that the numbers are meters, which
-/// only floating point can be. Of an EXR file, the channel `Z` or `depth` counts, also of a layer, or
-/// the only channel. NPZ archives need a single array, or one named `depth`.
+/// only floating point can be. Of an EXR file, the channel `Z` or `depth` counts, also that of a
+/// layer, or the only channel. NPZ archives need a single array, or one named `depth`.
 ///
 /// # Errors
 ///
