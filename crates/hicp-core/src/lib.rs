@@ -1,6 +1,6 @@
-//! The nouns of Hybrid ICP: poses, cameras, depth images, observations, models and correspondences.
+//! The data types of Hybrid ICP: poses, cameras, depth images, observations, models and pairs.
 //!
-//! The trait of renderers is here too.
+//! It also defines the trait of renderers.
 //!
 //! **Should you use this crate?** Yes, if you write a component (an association, a metric, a score)
 //! and want few dependencies. To refine poses, use `hybrid-icp`, which re-exports this crate.

@@ -4,8 +4,8 @@
 //!   [`SampledMve`] ranks many poses, and [`Vsd`] compares with a known true pose.
 //! - [`Evidence`]: what agrees with a pose, what contradicts it, and how well the mask fits.
 //! - [`Confidence`]: the probability that a pose is right, from the evidence and its [`Misfit`].
-//! - [`ColorAgreement`]: compares colors, and says whether they are evidence. [`SampledColor`]
-//!   ranks many poses.
+//! - [`ColorAgreement`]: compares colors, and returns how strong their evidence is.
+//!   [`SampledColor`] ranks many poses.
 //! - [`Flatness`]: recognizes a wall in the mask.
 //! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP
 //!   benchmark.

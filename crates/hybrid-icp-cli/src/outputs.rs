@@ -76,6 +76,12 @@ impl<'a> Files<'a> {
     pub(crate) fn check_in_place(&self, output: &str, input: &str) -> anyhow::Result<()> {
         for (index, (option, path)) in self.written.iter().enumerate() {
             hicp_io::check_writable(path)?;
+            let before = self.written[..index]
+                .iter()
+                .find(|(_, other)| other == path);
+            if let Some((other, _)) = before.filter(|_| *path == Path::new("-")) {
+                bail!("{option} and {other} both write to standard output, expected only one");
+            }
             for (other, other_path) in self.written[..index].iter().chain(&self.read) {
                 if (*option, *other) != (output, input) && same_file(path, other_path) {
                     bail!(

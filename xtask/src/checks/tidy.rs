@@ -46,6 +46,9 @@ const LEFT_OPEN: &[(&str, &str)] = &[
     ("dbg", "!("),
 ];
 
+/// The largest number of words of the README, with code and tables.
+const README_WORDS: usize = 650;
+
 /// Runs every rule.
 pub(crate) fn run() -> Result<()> {
     let mut findings = Vec::new();
@@ -59,6 +62,12 @@ pub(crate) fn run() -> Result<()> {
         );
         documentation(&name, &mut findings);
         findings.extend(cycles::find(&Path::new("crates").join(&*name).join("src"))?);
+    }
+    let words = read("README.md")?.split_whitespace().count();
+    if words > README_WORDS {
+        findings.push(format!(
+            "README.md: {words} words, expected at most {README_WORDS}"
+        ));
     }
     left_open(&mut findings)?;
     findings.extend(marks::check()?);

@@ -154,6 +154,11 @@ fn outputs_are_checked_before_anything_is_read() {
     }
     let scene = Scene::new().with("--overlay", "init.json");
     scene.run().fails(&["--overlay", "--init", "init.json"]);
+    let scene = Scene::new().with("--output", "-").with("--overlay", "-");
+    let told = scene
+        .run()
+        .fails(&["--output", "--overlay", "standard output"]);
+    assert_eq!(told.out, "");
     let scene = Scene::new().with("--output", "x").with("--overlay", "./x");
     scene
         .run()
