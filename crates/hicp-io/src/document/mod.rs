@@ -2,6 +2,7 @@
 
 #[cfg(any(feature = "xml", feature = "yaml"))]
 mod scalar;
+mod unique;
 #[cfg(feature = "xml")]
 mod xml;
 #[cfg(feature = "yaml")]
@@ -11,6 +12,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use self::unique::Unique;
 use crate::error::IoError;
 use crate::format::{self, Format};
 use crate::json;
@@ -39,7 +41,10 @@ pub(crate) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<V
                 }
             }
         }
-        Some(Format::Json) => json::parse(path, text_bytes(path, &content)?),
+        Some(Format::Json) => {
+            let Unique(value) = json::parse(path, text_bytes(path, &content)?)?;
+            Ok(value)
+        }
         format @ (None | Some(Format::Xml | Format::Yaml)) => {
             let Ok(text) = std::str::from_utf8(text_bytes(path, &content)?) else {
                 return Err(format::refuse(path, &content, expected));

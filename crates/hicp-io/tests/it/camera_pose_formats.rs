@@ -200,6 +200,10 @@ fn a_number_that_is_missing_or_wrong_is_named() {
             r#"{"fx": 600, "fy": 600, "ppx": 1e12, "ppy": 240}"#,
             ["$.ppx:", "cx is 1000000000000"],
         ),
+        (
+            r#"{"fx": 600, "fy": 600, "cx": 320, "cy": 240, "fx": 300}"#,
+            ["the key `fx` twice", "expected it once"],
+        ),
         (" \n", ["found no text", "a camera as JSON"]),
     ] {
         let path = folder.write("camera.json", text);
