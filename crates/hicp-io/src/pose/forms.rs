@@ -19,7 +19,7 @@ const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, t an
 /// Reads a pose in any common form, as JSON, YAML, XML, text or NPY.
 ///
 /// - BOP's JSON, as [`read_pose_json`](crate::read_pose_json) reads it. Its translation is in millimeters.
-/// - A 4×4 or 3×4 matrix, by rows.
+/// - A 4×4 or 3×4 matrix, by rows, also as the member `matrix`, `T` or `T_co` of an object.
 /// - An object with a rotation (`R`, `rotation`, `cam_R_m2c`: 3×3) and a translation (`t`,
 ///   `translation`, `position`, `cam_t_m2c`).
 /// - An object with a translation and a quaternion: `quaternion_xyzw`, `quaternion_wxyz`, or
@@ -83,7 +83,7 @@ type Parts = (UnitQuaternion<f64>, [f64; 3]);
 /// Returns the rotation and the translation of a supported form, or what is wrong with them.
 fn form(root: &Value) -> Option<Result<Parts, String>> {
     let member = |keys: &[&str]| keys.iter().find_map(|key| root.get(*key));
-    if let Some(matrix) = member(&["matrix", "transform", "pose", "T", "transformation"]) {
+    if let Some(matrix) = member(&["matrix", "transform", "pose", "T", "T_co", "transformation"]) {
         return form(matrix);
     }
     // A message of ROS has a list.

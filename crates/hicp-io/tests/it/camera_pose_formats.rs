@@ -258,6 +258,12 @@ fn poses_of_every_form_are_the_same() {
     }
     check("pose_bop_rows.json", None, 1.0);
     check("pose_bop_rows.json", Some(LengthUnit::Meters), 1000.0);
+
+    // A result of Python as JSON.
+    let matrix = "[[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.8], [0, 0, 0, 1]]";
+    let text = format!(r#"{{"T_co": {matrix}, "mve": 0.1}}"#);
+    let file = read_pose(Folder::new().write("pose.json", text), None).unwrap();
+    assert_eq!(file.translation_mm, [100.0, 200.0, 800.0]);
 }
 
 #[test]

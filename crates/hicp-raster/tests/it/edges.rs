@@ -55,7 +55,7 @@ fn the_top_and_left_edges_own_their_pixels() {
 #[test]
 fn a_vertex_at_a_pixel_center_belongs_to_one_triangle_of_its_fan() {
     let camera = pixel_camera();
-    let centre = (10.0, 10.0);
+    let center = (10.0, 10.0);
     let ring = [
         (20.0, 10.0),
         (18.0, 16.0),
@@ -66,7 +66,7 @@ fn a_vertex_at_a_pixel_center_belongs_to_one_triangle_of_its_fan() {
         (10.0, 2.0),
         (15.0, 5.0),
     ];
-    let points: Vec<_> = std::iter::once(centre).chain(ring).collect();
+    let points: Vec<_> = std::iter::once(center).chain(ring).collect();
     let fan: Vec<_> = (0..8).map(|k| [0, 1 + k, 1 + (k + 1) % 8]).collect();
     let hits = hits(&flat_mesh(&points, &fan), &camera, &one_meter());
     assert!(hits.iter().all(|hit| *hit <= 1));

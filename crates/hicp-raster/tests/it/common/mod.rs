@@ -108,7 +108,7 @@ pub(crate) fn near_an_edge(
     margin: f64,
 ) -> bool {
     let near = DEFAULT_NEAR_METERS;
-    let centre = (f64::from(u), f64::from(v));
+    let center = (f64::from(u), f64::from(v));
     (0..mesh.triangles().len()).any(|triangle| {
         let corners = mesh.corners(triangle).map(|p| pose * p.cast::<f64>());
         let mut outline: Vec<Point3<f64>> = Vec::new();
@@ -131,7 +131,7 @@ pub(crate) fn near_an_edge(
             })
             .collect();
         (0..outline.len()).any(|k| {
-            segment_distance(centre, outline[k], outline[(k + 1) % outline.len()]) <= margin
+            segment_distance(center, outline[k], outline[(k + 1) % outline.len()]) <= margin
         })
     })
 }
