@@ -18,7 +18,7 @@ pub(super) fn is_distortion(key: &str, value: &Value) -> bool {
         || name.starts_with("distcoef");
     let is_stated = match value {
         Value::Array(items) => !items.is_empty(),
-        value => value.is_object() || value.is_number(),
+        value => value.is_object(),
     };
     is_known && is_stated
 }
