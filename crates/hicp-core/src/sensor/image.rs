@@ -174,8 +174,7 @@ impl DepthImage {
             .chunks_exact(self.width().max(1) as usize)
             .step_by(factor as usize)
         {
-            // Steps through the row's iterator take more instructions.
-            pixels.extend((0..row.len()).step_by(factor as usize).map(|u| row[u]));
+            pixels.extend(row.iter().step_by(factor as usize));
         }
         Self(Raster {
             width,

@@ -38,18 +38,15 @@ pub(super) fn is_bop(root: &Value) -> bool {
         Some(Value::Object(first)) if of_images => first,
         _ => members,
     };
-    let has_name = |key: &&str| camera.get(*key).is_some_and(|value| !value.is_null());
-    let is_distorted = COEFFICIENTS.iter().any(has_name)
-        || camera.iter().any(|(key, value)| is_distortion(key, value));
     if camera.contains_key("cam_model") {
         return true;
     }
-    if is_distorted {
-        return false;
-    }
+    let is_stated = |key: &&str| camera.get(*key).is_some_and(|value| !value.is_null());
+    let is_distorted = COEFFICIENTS.iter().any(is_stated)
+        || camera.iter().any(|(key, value)| is_distortion(key, value));
     let flat = ["fx", "fy", "cx", "cy", "width", "height"];
-    camera.contains_key("cam_K")
-        || (flat.iter().all(|key| camera.contains_key(*key)) && !camera.contains_key("ppx"))
+    let is_flat = flat.iter().all(|key| camera.contains_key(*key)) && !camera.contains_key("ppx");
+    !is_distorted && (camera.contains_key("cam_K") || is_flat)
 }
 
 /// The keys of all supported forms of a camera.

@@ -145,14 +145,16 @@ impl Form<'_> {
             let numbers = self.named(|name| self.member(&[name]).map(|(_, value)| value), "")?;
             return Ok(("k1".to_owned(), numbers));
         };
-        let found = || quote(&value.to_string());
         match numbers(value) {
             Some(numbers) => Ok((key.clone(), numbers)),
             None if COEFFICIENTS.iter().any(|name| value.get(name).is_some()) => {
                 let numbers = self.named(|name| value.get(name), &format!(".{key}"))?;
                 Ok((key.clone(), numbers))
             }
-            None => Err(self.refuse(&format!(".{key}"), found(), "a list of finite numbers")),
+            None => {
+                let found = quote(&value.to_string());
+                Err(self.refuse(&format!(".{key}"), found, "a list of finite numbers"))
+            }
         }
     }
 

@@ -4,6 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use exr::meta::BlockDescription;
+use exr::meta::header::Header;
 use exr::prelude::{MetaData, ReadChannels, ReadLayers, ReadSpecificChannel, Text, Vec2, read};
 
 use super::raster::{Raster, check_size};
@@ -92,10 +93,7 @@ fn parts(name: &Text) -> (String, String) {
 }
 
 /// Returns the channel with depth, or the only channel, or `None` if several are alike.
-fn depth_channel<'a, H>(names: &[(H, &'a Text)]) -> Option<(H, &'a Text)>
-where
-    H: Copy,
-{
+fn depth_channel<'a>(names: &[(&'a Header, &'a Text)]) -> Option<(&'a Header, &'a Text)> {
     let all: Vec<_> = names.iter().map(|(_, name)| parts(name)).collect();
     let rank = |(layer, last): &(String, String)| {
         let kind = NAMES.iter().position(|name| name == last)?;
@@ -108,18 +106,15 @@ where
         (!is_vector).then_some((class, kind))
     };
     let ranks: Vec<_> = all.iter().map(rank).collect();
-    let best = ranks.iter().flatten().min();
-    let mut chosen = names
-        .iter()
-        .zip(&ranks)
-        .filter(|(_, rank)| rank.as_ref() == best);
-    let first = match best {
-        Some(_) => chosen.next().map(|(channel, _)| channel),
-        None => names.first().filter(|_| names.len() == 1),
+    let Some(best) = ranks.iter().flatten().min() else {
+        return names.first().filter(|_| names.len() == 1).copied();
     };
-    first
-        .filter(|_| best.is_none() || chosen.next().is_none())
-        .copied()
+    let ranked = names.iter().zip(&ranks);
+    let mut chosen = ranked.filter(|(_, rank)| rank.as_ref() == Some(best));
+    match (chosen.next(), chosen.next()) {
+        (Some((channel, _)), None) => Some(*channel),
+        _ => None,
+    }
 }
 
 /// Returns whether a channel is the green or blue one of a red one.

@@ -81,6 +81,7 @@ impl CoarseGrid {
         let mut measured = Vec::with_capacity(length);
         measured.extend_from_slice(fine.depth().decimated(factor).pixels());
         let mut distance_per_depth = Vec::with_capacity(length);
+        // `PinholeCamera::distance_per_depth`, with one division per row and column.
         let squared = |pixel: u32, center: f64, focal_length: f64| {
             let slope = (f64::from(pixel) - center) / focal_length;
             slope * slope
