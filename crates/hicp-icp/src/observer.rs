@@ -17,12 +17,11 @@ use crate::outcome::{Evaluation, Outcome};
     note = "`Session::new` and `refine_observed` accept `&mut` of an `Observer`; `&mut ()` observes nothing"
 )]
 pub trait Observer {
-    /// Receives an evaluated pose. `Break` ends the stage there, with
+    /// Receives an evaluated pose. `Break` ends the run there, with
     /// [`Termination::Stopped`](crate::Termination::Stopped).
     ///
-    /// It is called before the stop rules judge the pose. If one rejects it, the stage does not
-    /// return this pose, and the judgment takes precedence over a `Break`. Composed stages continue
-    /// with the next part and call the observer again.
+    /// No other part of a composed stage runs then. It is called before the stop rules judge the
+    /// pose. If one rejects it, the run returns the pose before it.
     fn on_iteration(&mut self, event: &IterationEvent<'_>) -> ControlFlow<()> {
         let _ = event;
         ControlFlow::Continue(())

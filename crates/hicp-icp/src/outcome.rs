@@ -28,8 +28,10 @@ pub enum Termination {
     OutOfBounds,
     /// The time limit was reached. The last evaluated pose is returned.
     Deadline,
-    /// The observer requested the stop. The last evaluated pose is returned.
+    /// The observer requested the stop. The last accepted pose is returned.
     Stopped,
+    /// No stage ran, for example because a cascade is empty or the pose was only judged.
+    Kept,
     /// A guard's score did not improve.
     ScoreNotImproved,
     /// The named part cannot work on the two sides of the problem.
@@ -43,7 +45,7 @@ pub enum Termination {
 
 impl Termination {
     /// All reasons that the library defines, except for those with a name inside.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Converged,
         Self::IterationLimit,
         Self::NoPairs,
@@ -54,6 +56,7 @@ impl Termination {
         Self::OutOfBounds,
         Self::Deadline,
         Self::Stopped,
+        Self::Kept,
         Self::ScoreNotImproved,
     ];
 
@@ -87,6 +90,7 @@ impl Termination {
             ),
             Self::Deadline => ("deadline", "the time limit was reached"),
             Self::Stopped => ("stopped", "the observer requested the stop"),
+            Self::Kept => ("kept", "no stage ran"),
             Self::ScoreNotImproved => ("score_not_improved", "the score did not improve"),
             Self::Unsupported(_) => (
                 "unsupported",
@@ -308,10 +312,7 @@ impl Outcome {
             &self
         };
         let moved = self.verdict == Verdict::Refined || next.verdict == Verdict::Refined;
-        // An empty cascade does nothing, so it does not end anything.
-        let empty =
-            next.iterations == 0 && next.verdict == Verdict::KeptInitial(Termination::Converged);
-        let termination = if empty {
+        let termination = if next.termination == Termination::Kept {
             self.termination
         } else {
             next.termination

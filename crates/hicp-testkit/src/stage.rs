@@ -3,7 +3,9 @@
 use std::ops::ControlFlow;
 
 use hybrid_icp::core::{Isometry3, se3};
-use hybrid_icp::icp::{IterationEvent, Observer, Outcome, Session, Stage, Verdict, Workspace};
+use hybrid_icp::icp::{
+    IterationEvent, Observer, Outcome, Session, Stage, Termination, Verdict, Workspace,
+};
 
 use crate::law::{PURE, Subject, Trial, bits};
 use crate::scenes::{Case, cases, sides, workspace};
@@ -38,7 +40,8 @@ impl Default for StageLaws {
 ///   most the counted iterations.
 /// - Pure: a fresh, a used and a boxed stage give the same bits, with a fresh and with a used
 ///   workspace.
-/// - If the observer stops the stage at the first iteration, the result is valid, too.
+/// - If the observer stops the stage at the first iteration, the result is valid, its reason is
+///   [`Termination::Stopped`], and the observer receives no other iteration.
 ///
 /// # Panics
 ///
@@ -66,8 +69,16 @@ pub fn check_stage<T: Stage + 'static>(make: impl Fn() -> T, laws: StageLaws) {
             let law = "if nothing is observed, the initial pose is returned bit for bit";
             trial.same(law, init, &outcome.camera_from_object);
         }
-        let stopped = trial.calm(|| run(&mut make(), &mut workspace(), &case, &mut Stopper));
+        let mut stopper = Stopper(0);
+        let stopped = trial.calm(|| run(&mut make(), &mut workspace(), &case, &mut stopper));
         finite(&trial, init, &stopped);
+        let ended = match stopper.0 {
+            0 => true,
+            1 => stopped.termination == Termination::Stopped,
+            _ => false,
+        };
+        let law = "a stage that the observer stops ends as `Stopped`, and runs nothing else";
+        trial.holds(law, ended, format_args!("{stopped:?}"));
     }
 }
 
@@ -92,11 +103,12 @@ impl Observer for Reported {
     }
 }
 
-/// An observer that stops at the first iteration.
-struct Stopper;
+/// An observer that stops at the first iteration, and counts its calls.
+struct Stopper(usize);
 
 impl Observer for Stopper {
     fn on_iteration(&mut self, _event: &IterationEvent<'_>) -> ControlFlow<()> {
+        self.0 += 1;
         ControlFlow::Break(())
     }
 }

@@ -33,7 +33,7 @@ impl Observer for Table {
             angle.to_degrees(),
             distance * 1e3
         );
-        ControlFlow::Continue(()) // `Break` would end the stage here.
+        ControlFlow::Continue(()) // `Break` would end the run here.
     }
 
     fn on_decision(&mut self, event: &DecisionEvent<'_>) {

@@ -50,8 +50,9 @@ pub struct Refinement {
     pub flatness: Option<Flatness>,
     /// The evidence for and against the returned pose, and how well the mask fits it.
     pub evidence: Evidence,
-    /// The number of other poses that look alike and explain the image as well, at most 4.
+    /// The expected number of other poses that look alike and explain the image as well, at most 4.
     ///
+    /// A pose counts by its likelihood ([`Alternative::likelihood`]), so the number can be 0.4.
     /// Declared symmetries do not count.
     pub look_alikes: f64,
     /// The best other pose that a search found; `None` without a search or another pose.
@@ -112,6 +113,13 @@ pub struct Refiner<S = BoxedStage> {
     look_alikes: LookAlikeCount<SampledMve, MeanVsd>,
     /// Measures the pairs of a pose that no registration evaluated.
     registration: presets::Fit,
+}
+
+/// Runs the default preset, [`Preset::Auto`].
+impl Default for Refiner {
+    fn default() -> Self {
+        Self::preset(Preset::default())
+    }
 }
 
 impl Refiner {
@@ -256,7 +264,7 @@ impl<S: Stage> Refiner<S> {
         let problem = Problem::new(model, observation);
         self.workspace.alternatives_mut().clear();
         let mve = self.mve(model, observation, camera_from_object);
-        let outcome = Outcome::kept(camera_from_object, Termination::Converged);
+        let outcome = Outcome::kept(camera_from_object, Termination::Kept);
         self.judged(&problem, Some((camera_from_object, mve)), outcome)
     }
 

@@ -1,5 +1,7 @@
 //! Anderson acceleration of a stage.
 
+use std::time::Duration;
+
 use hicp_core::{Isometry3, Problem, Vector6, se3};
 use nalgebra::{Matrix5, Matrix6x5, Vector5};
 
@@ -76,6 +78,12 @@ impl<S: Stage> Stage for Anderson<S> {
         for _ in 0..self.max_steps {
             let step = self.stage.run(problem, &start, session);
             iterations += step.iterations;
+            let stopped = step.termination == Termination::Stopped;
+            let ended = if stopped {
+                Termination::Stopped
+            } else {
+                Termination::Converged
+            };
             let loss = step.evaluation.map(|e| e.mean_loss);
             let improves = match (&best, loss) {
                 (Some((_, before)), Some(now)) => now < *before,
@@ -84,8 +92,8 @@ impl<S: Stage> Stage for Anderson<S> {
             };
             if !improves {
                 let Some((plain, _)) = &best else { break };
-                if !extrapolated {
-                    termination = Termination::Converged;
+                if stopped || !extrapolated {
+                    termination = ended;
                     break;
                 }
                 // The extrapolation did not help: continue from the plain iterate, and clear the
@@ -105,8 +113,8 @@ impl<S: Stage> Stage for Anderson<S> {
                 distance < self.translation_meters && angle.to_degrees() < self.rotation_degrees;
             let next = memory.extrapolate(&twist(&start), &twist(&step.camera_from_object));
             best = Some((step, loss));
-            if still {
-                termination = Termination::Converged;
+            if stopped || still {
+                termination = ended;
                 break;
             }
             let next = se3::exp(&next) * init;
@@ -130,6 +138,10 @@ impl<S: Stage> Stage for Anderson<S> {
             },
             None => Outcome::kept(init, termination),
         }
+    }
+
+    fn time_limit(&self) -> Option<Duration> {
+        self.stage.time_limit()
     }
 
     fn name(&self) -> &'static str {

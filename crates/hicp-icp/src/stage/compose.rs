@@ -1,9 +1,11 @@
 //! Stages made of stages.
 
+use std::time::Duration;
+
 use hicp_core::internal::for_tuples;
 use hicp_core::{Isometry3, Problem};
 
-use crate::outcome::{Outcome, Verdict};
+use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::stage_trait::Stage;
 
@@ -11,10 +13,12 @@ use crate::stage::stage_trait::Stage;
 ///
 /// A stage that diverges returns the pose that it accepted last, and the next stage starts there.
 /// If the first stage diverges in its first step, the second starts from the initial pose. If it
-/// diverges later, the second starts from the last pose before the divergence. Losses are never
-/// compared across stages. The stages can read the initial pose of the cascade
-/// ([`Session::cascade_init`]): `SelectAt::Cascade` selects there. In a cascade inside of another,
-/// this is the initial pose of the inner one.
+/// diverges later, the second starts from the last pose before the divergence. After a stage that
+/// the observer stopped, no other one runs. Losses are never compared across stages.
+///
+/// The stages can read the initial pose of the cascade ([`Session::cascade_init`]):
+/// `SelectAt::Cascade` selects there. In a cascade inside of another, this is the initial pose of
+/// the inner one.
 ///
 /// The paper's cascade is `Cascade((point_to_point, point_to_plane))`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,7 +38,10 @@ macro_rules! cascade {
                 let outer = session.cascade_init.replace(*init);
                 let outcome = $first.run(problem, init, session);
                 $(
-                    let outcome = outcome.then($next.run(problem, &outcome.camera_from_object, session));
+                    let outcome = match outcome.termination {
+                        Termination::Stopped => outcome,
+                        _ => outcome.then($next.run(problem, &outcome.camera_from_object, session)),
+                    };
                 )*
                 session.cascade_init = outer;
                 outcome
@@ -48,7 +55,7 @@ macro_rules! cascade {
 }
 for_tuples!(cascade);
 
-/// A cascade without stages keeps the initial pose as converged, for a branch of a switch.
+/// A cascade without stages keeps the initial pose, for a branch of a switch.
 impl Stage for Cascade<()> {
     fn run(
         &mut self,
@@ -56,7 +63,7 @@ impl Stage for Cascade<()> {
         init: &Isometry3<f64>,
         _session: &mut Session<'_>,
     ) -> Outcome {
-        Outcome::kept(init, crate::Termination::Converged)
+        Outcome::kept(init, Termination::Kept)
     }
 
     fn name(&self) -> &'static str {
@@ -66,7 +73,7 @@ impl Stage for Cascade<()> {
 
 /// A cascade of any number of stages of one type, as read from a file.
 ///
-/// An empty one keeps the initial pose as converged.
+/// An empty one keeps the initial pose.
 impl<T: Stage> Stage for Cascade<Vec<T>> {
     fn run(
         &mut self,
@@ -80,9 +87,12 @@ impl<T: Stage> Stage for Cascade<Vec<T>> {
             let start = outcome.map_or(*init, |o| o.camera_from_object);
             let next = stage.run(problem, &start, session);
             outcome = Some(outcome.map_or(next, |o| o.then(next)));
+            if next.termination == Termination::Stopped {
+                break;
+            }
         }
         session.cascade_init = outer;
-        outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::Converged))
+        outcome.unwrap_or_else(|| Outcome::kept(init, Termination::Kept))
     }
 
     fn name(&self) -> &'static str {
@@ -114,11 +124,15 @@ impl<S: Stage> Stage for Repeat<S> {
             let start = outcome.map_or(*init, |o| o.camera_from_object);
             let next = self.stage.run(problem, &start, session);
             outcome = Some(outcome.map_or(next, |o| o.then(next)));
-            if next.verdict != Verdict::Refined {
+            if next.verdict != Verdict::Refined || next.termination == Termination::Stopped {
                 break;
             }
         }
-        outcome.unwrap_or_else(|| Outcome::kept(init, crate::Termination::IterationLimit))
+        outcome.unwrap_or_else(|| Outcome::kept(init, Termination::IterationLimit))
+    }
+
+    fn time_limit(&self) -> Option<Duration> {
+        self.stage.time_limit()
     }
 
     fn name(&self) -> &'static str {

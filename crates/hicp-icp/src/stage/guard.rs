@@ -1,5 +1,7 @@
 //! Stages that are guarded by a score.
 
+use std::time::Duration;
+
 use hicp_core::{Isometry3, Problem};
 use hicp_score::Score;
 
@@ -51,6 +53,10 @@ impl<S: Stage, C: Score> Stage for Guard<S, C> {
         }
     }
 
+    fn time_limit(&self) -> Option<Duration> {
+        self.stage.time_limit()
+    }
+
     fn name(&self) -> &'static str {
         "guard"
     }
@@ -60,7 +66,7 @@ impl<S: Stage, C: Score> Stage for Guard<S, C> {
 ///
 /// The initial pose takes part. The loop ends early if the stage keeps its pose. On a tie the
 /// earlier pose is returned, so a stage without an improvement does not move the pose.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepBest<S, C> {
     /// Maximum number of passes.
     pub times: usize,
@@ -101,11 +107,18 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
             if kept {
                 best = (score, last);
             }
+            if next.termination == Termination::Stopped {
+                break;
+            }
         }
         Outcome {
             iterations: last.iterations,
             ..best.1
         }
+    }
+
+    fn time_limit(&self) -> Option<Duration> {
+        self.stage.time_limit()
     }
 
     fn name(&self) -> &'static str {

@@ -118,13 +118,14 @@ where
                 mean_loss: step.mean_loss,
             };
             let first = *first.get_or_insert(current);
-            let request = session.observer.on_iteration(&IterationEvent {
+            let stops = session.observer.on_iteration(&IterationEvent {
                 iteration: iteration.index,
                 camera_from_object: &candidate,
                 evaluation: current,
                 increment: &step.increment,
                 pairs: Some(pairs),
             });
+            let stops = stops.is_break();
             let progress = Progress {
                 current,
                 first,
@@ -138,18 +139,22 @@ where
             // iteration without another evaluation. Here a pose is returned only after its pairs
             // and its loss were computed, because the rules of §IV-B judge these.
             if let Judgment::Reject(termination) = judgment {
-                break termination;
+                break if stops {
+                    Termination::Stopped
+                } else {
+                    termination
+                };
             }
             accepted = Some(Accepted {
                 camera_from_object: candidate,
                 evaluation: current,
                 iteration,
             });
+            if stops {
+                break Termination::Stopped;
+            }
             if let Judgment::Accept(termination) = judgment {
                 break termination;
-            }
-            if request.is_break() {
-                break Termination::Stopped;
             }
             if evaluations >= MAX_ITERATIONS {
                 break Termination::IterationLimit;

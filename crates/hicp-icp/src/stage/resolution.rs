@@ -1,5 +1,7 @@
 //! Stages at a lower image resolution.
 
+use std::time::Duration;
+
 use hicp_core::{Isometry3, Problem};
 
 use crate::outcome::Outcome;
@@ -36,6 +38,10 @@ impl<S: Stage> Stage for AtResolution<S> {
         };
         let coarse = observation.decimated(self.factor);
         self.stage.run(&Problem::new(model, &coarse), init, session)
+    }
+
+    fn time_limit(&self) -> Option<Duration> {
+        self.stage.time_limit()
     }
 
     fn name(&self) -> &'static str {

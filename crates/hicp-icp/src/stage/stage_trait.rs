@@ -53,13 +53,17 @@ use crate::session::Session;
 ///             let mut context = session.context(problem);
 ///             self.nearest.associate(&mut context, source, &pose, &mut self.pairs);
 ///             let Some(step) = PointToPoint.step(&self.pairs) else { break };
-///             if iteration > 0 {
-///                 outcome = Outcome::refined(pose, ended);
-///             }
 ///             let (n_pairs, mean_loss) = (self.pairs.len(), step.mean_loss);
 ///             let evaluation = Evaluation { n_pairs, mean_loss };
 ///             let event = IterationEvent::new(iteration, &pose, evaluation, &step.increment);
-///             if session.observer.on_iteration(&event).is_break() {
+///             let stops = session.observer.on_iteration(&event).is_break();
+///             // Composed stages end after a stage with this reason.
+///             let ended = if stops { Termination::Stopped } else { ended };
+///             outcome = match iteration {
+///                 0 => Outcome::kept(init, ended),
+///                 _ => Outcome::refined(pose, ended),
+///             };
+///             if stops {
 ///                 break;
 ///             }
 ///             pose = step.increment * pose;
@@ -85,7 +89,8 @@ pub trait Stage {
         session: &mut Session<'_>,
     ) -> Outcome;
 
-    /// Returns the time limit of a run, if the stage has one.
+    /// Returns the time limit of a run, if the stage has one. A stage around one stage returns that
+    /// of the wrapped one.
     ///
     /// A search without an initial pose that ends with this stage has the same limit.
     fn time_limit(&self) -> Option<Duration> {

@@ -54,7 +54,7 @@ fn outcomes_of_consecutive_stages_combine() {
     // An empty stage ends nothing, so the observer's stop of the one before it is reported.
     let stopped = Verdict::KeptInitial(Termination::Stopped);
     let stopped = outcome(1.0, stopped, 3, Some(5.0));
-    let empty = Outcome::kept(&stopped.camera_from_object, Termination::Converged);
+    let empty = Outcome::kept(&stopped.camera_from_object, Termination::Kept);
     assert_eq!(stopped.then(empty), stopped);
     // A stage that moved the pose without iterations is not empty.
     let limited = outcome(
@@ -85,10 +85,10 @@ fn a_kept_outcome_has_the_initial_pose() {
         stage: Scheduled::new(kept, 1.0),
     };
     for (outcome, termination) in [
-        (run(&mut Cascade(()), &init), Termination::Converged),
+        (run(&mut Cascade(()), &init), Termination::Kept),
         (
             run(&mut Cascade(Vec::<Box<dyn Stage>>::new()), &init),
-            Termination::Converged,
+            Termination::Kept,
         ),
         (run(&mut never, &init), Termination::IterationLimit),
     ] {

@@ -8,7 +8,7 @@ use hicp_tests::perturbed_scene;
 use hybrid_icp::core::{
     Isometry3, Model, Point3, Problem, Translation3, UnitQuaternion, UnitVector3, Vector3, se3,
 };
-use hybrid_icp::icp::{Outcome, Session, Stage, Verdict};
+use hybrid_icp::icp::{Outcome, Session, Stage, Termination, Verdict};
 use hybrid_icp::score::{MeanVsd, Score};
 use hybrid_icp::{Preset, Refiner};
 
@@ -38,7 +38,11 @@ impl<S: Stage, C: Score> Stage for BothWays<S, C> {
         let center = Translation3::from(center.coords);
         let turn = UnitQuaternion::from_axis_angle(&self.axis, PI);
         let turned = init * center * turn * center.inverse();
-        let mut outcomes = [init, &turned].map(|start| self.stage.run(problem, start, session));
+        let straight = self.stage.run(problem, init, session);
+        if straight.termination == Termination::Stopped {
+            return straight;
+        }
+        let mut outcomes = [straight, self.stage.run(problem, &turned, session)];
         let iterations = outcomes.iter().map(|outcome| outcome.iterations).sum();
         let mut score = |outcome: &Outcome| {
             let mut context = session.workspace.context(problem);

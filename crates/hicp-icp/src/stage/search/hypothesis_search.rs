@@ -463,10 +463,15 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
             &run.distinct,
             &mut run.session.workspace.alternatives,
         );
-        if run.clock.is_over() {
-            returned.termination = Termination::Deadline;
+        let ended = if run.stopped {
+            Some(Termination::Stopped)
+        } else {
+            run.clock.is_over().then_some(Termination::Deadline)
+        };
+        if let Some(reason) = ended {
+            returned.termination = reason;
             if returned.verdict != Verdict::Refined {
-                returned.verdict = Verdict::KeptInitial(Termination::Deadline);
+                returned.verdict = Verdict::KeptInitial(reason);
             }
         }
         Outcome {
