@@ -195,7 +195,7 @@ impl Bench {
             let view = scene.view(&mut rng, frame, &self.models, &self.camera, &sensor)?;
             let depth = Arc::new(view.depth.clone());
             let clock = Instant::now();
-            let tracked = tracker.step(&depth, 1.0 / fps, None)?;
+            let tracked = tracker.step(depth, 1.0 / fps, None)?;
             let ms = 1e3 * clock.elapsed().as_secs_f64();
             counts.tracker_ms.push(ms);
             if tracked.state == TrackState::Lost {
@@ -271,7 +271,7 @@ impl Counts {
         let mut state = TrackState::Tracking;
         for frame in 0..STILL_FRAMES {
             let clock = Instant::now();
-            let tracked = tracker.step(depth, 1.0 / 30.0, None)?;
+            let tracked = tracker.step(Arc::clone(depth), 1.0 / 30.0, None)?;
             let ms = 1e3 * clock.elapsed().as_secs_f64();
             self.tracker_ms.push(ms);
             let lost = tracked.state == TrackState::Lost;

@@ -108,10 +108,13 @@ impl Cloud {
     /// It is computed on first use. Cost: about O(n log n).
     #[must_use]
     pub fn diameter(&self) -> f64 {
-        *self.derived.get_or_build(0, || {
+        /// Private, so that no value of another crate has its key.
+        struct Diameter(f64);
+        let of_all = || {
             let points: Vec<_> = self.surfels.iter().map(|surfel| surfel.point).collect();
-            diameter(&points)
-        })
+            Diameter(diameter(&points))
+        };
+        self.derived.get_or_build(0, of_all).0
     }
 
     /// Values derived from this cloud, such as search trees: built once, shared by all threads.

@@ -19,6 +19,9 @@ pub struct Derived {
 impl Derived {
     /// Returns the value of type `T` under `key`, building it on first use.
     ///
+    /// `T` must be a type of the calling crate, such as a newtype. Otherwise two crates can share a
+    /// key, and one of them receives the value of the other.
+    ///
     /// Threads that request a value under construction wait for it; other threads do not wait.
     /// `build` may request other values. If it requests its own, it waits forever. Values live as
     /// long as their owner.

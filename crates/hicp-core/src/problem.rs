@@ -239,12 +239,15 @@ impl<'a> Iteration<'a> {
 ///
 /// Selections, associations, scores and switchers receive it.
 ///
-/// Copy `context.problem` before borrowing a view to use both:
+/// A view borrows the context, so copy `context.problem` first to use both:
 ///
 /// ```
 /// use hicp_core::{Context, Isometry3};
-/// fn visible_pixels(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> usize {
-///     context.view(camera_from_object).map_or(0, |view| view.n_rendered())
+/// /// Returns the rendered share of the measured pixels.
+/// fn coverage(context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> Option<f64> {
+///     let (_, observation) = context.problem.sides()?;
+///     let view = context.view(camera_from_object)?;
+///     Some(view.n_rendered() as f64 / observation.n_measured().max(1) as f64)
 /// }
 /// ```
 #[derive(Debug)]

@@ -187,7 +187,8 @@ impl VectorLoop for CountRendered<'_> {
 ///   empty region if it cannot cover any. Work is proportional to the mesh and that part, never to
 ///   the image.
 /// - Pixel (u, v) shows the nearest surface along the ray through ((u−cx)/fx, (v−cy)/fy, 1), as
-///   depth (z) in meters.
+///   depth (z) in meters, and the index of its triangle. Without a surface, the depth is 0 and the
+///   triangle [`NO_TRIANGLE`].
 /// - Surface nearer than the renderer's near plane is clipped. A mesh behind the camera renders
 ///   nothing.
 /// - The result does not depend on the order of the triangles. Shared edges leave neither gaps nor
@@ -212,18 +213,23 @@ pub trait Renderer {
     );
 }
 
-impl<R: Renderer + ?Sized> Renderer for Box<R> {
-    fn render(
-        &mut self,
-        mesh: &TriMesh,
-        camera: &PinholeCamera,
-        camera_from_object: &Isometry3<f64>,
-        region: &PixelRegion,
-        view: &mut RenderedView,
-    ) {
-        (**self).render(mesh, camera, camera_from_object, region, view);
-    }
+macro_rules! forward {
+    ($($pointer:ty),+) => {$(
+        impl<R: Renderer + ?Sized> Renderer for $pointer {
+            fn render(
+                &mut self,
+                mesh: &TriMesh,
+                camera: &PinholeCamera,
+                camera_from_object: &Isometry3<f64>,
+                region: &PixelRegion,
+                view: &mut RenderedView,
+            ) {
+                (**self).render(mesh, camera, camera_from_object, region, view);
+            }
+        }
+    )+};
 }
+forward!(Box<R>, &mut R);
 
 /// Number of cached renders: Hybrid ICP requests the same pose at most a few renders apart.
 const CACHED_VIEWS: usize = 4;

@@ -17,6 +17,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// An invalid estimate, motion or parameter.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum FusionError {
     /// A translation is not finite or beyond [`MAX_TRANSLATION_METERS`].

@@ -8,7 +8,6 @@ use hicp_core::Isometry3;
 /// of the diameter. MSSD and angle are up to declared symmetries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
 pub struct Alternative {
     /// The pose `camera_from_object`, meters.
     pub camera_from_object: Isometry3<f64>,

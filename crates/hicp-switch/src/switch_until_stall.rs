@@ -18,7 +18,7 @@ use crate::switcher::Switcher;
 /// without a score.
 ///
 /// Cost: a choice, and at most `max_steps` × (a stage and a choice).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwitchUntilStall<W, A, M> {
     /// Selects the regime of a pose, and scores it: a [`Threshold`](crate::Threshold) on the MVE.
     pub switcher: W,

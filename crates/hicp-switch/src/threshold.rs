@@ -9,7 +9,7 @@ use crate::switcher::Switcher;
 /// Selects misaligned if a score is at least α, otherwise aligned.
 ///
 /// With the MVE as the score, it is Dynamic Switching (§IV-A).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold<S> {
     /// The score; higher is worse.
     pub score: S,
@@ -19,6 +19,16 @@ pub struct Threshold<S> {
 
 /// The threshold on the MVE that generalizes according to the paper (§IV-A.2).
 pub const PAPER_ALPHA: f64 = 0.4;
+
+/// The paper's threshold on the default score.
+impl<S: Default> Default for Threshold<S> {
+    fn default() -> Self {
+        Self {
+            score: S::default(),
+            alpha: PAPER_ALPHA,
+        }
+    }
+}
 
 impl<S: Score> Switcher for Threshold<S> {
     fn regime(
@@ -50,7 +60,7 @@ impl<S: Score> Switcher for Threshold<S> {
 ///
 /// It is regime k if exactly k of the bounds are at or below the score. With one bound it equals
 /// [`Threshold`].
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Thresholds<S> {
     /// The score; higher is worse.
     pub score: S,

@@ -53,6 +53,13 @@ macro_rules! declare {
     };
 }
 
+/// [`Preset::Auto`].
+impl Default for Preset {
+    fn default() -> Self {
+        Self::Auto
+    }
+}
+
 declare! {
     Hybrid, "hybrid", hybrid,
         "Hybrid ICP: twice, by the MVE, the projective cascade (below 0.4) or nn-point-to-point";

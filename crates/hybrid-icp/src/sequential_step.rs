@@ -50,6 +50,7 @@ impl Default for SequentialConfig {
 
 /// The effect of one image.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum SequentialEvent {
     /// There was an estimate, and the fuser returned this.
@@ -117,6 +118,7 @@ impl MotionCheck {
 ///
 /// Poses and covariances are in the camera frame of that image.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SequentialStep {
     /// The fused pose; while there is no estimate, the initial one, moved with the camera.

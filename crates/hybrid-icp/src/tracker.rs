@@ -54,7 +54,6 @@ const NEAR_DIAMETERS: f64 = 0.4;
 /// thread.
 ///
 /// ```
-/// use std::sync::Arc;
 /// use hicp_sim::{DepthSensor, Household, MovingConfig, MovingScene, rng};
 /// use hybrid_icp::core::PinholeCamera;
 /// use hybrid_icp::{TrackState, Tracker, TrackerConfig};
@@ -68,7 +67,7 @@ const NEAR_DIAMETERS: f64 = 0.4;
 /// tracker.start(&scene.poses[0]);
 /// for frame in 0..5 {
 ///     let view = scene.view(&mut rng(2), frame, &[mug.clone()], &camera, &DepthSensor::default())?;
-///     let tracked = tracker.step(&Arc::new(view.depth), 1.0 / 30.0, None)?;
+///     let tracked = tracker.step(view.depth, 1.0 / 30.0, None)?;
 ///     assert_eq!(tracked.state, TrackState::Tracking);
 /// }
 /// # Ok(()) }
@@ -103,7 +102,7 @@ impl Tracker {
 
     /// Starts from a rough pose (`camera_from_object`, meters) in the next image.
     ///
-    /// A pose that is not finite stops the tracker.
+    /// After a pose that is not finite, the object is [`TrackState::Lost`] until the next start.
     pub fn start(&mut self, camera_from_object: &Isometry3<f64>) {
         let motion = self.at_rest(camera_from_object, START_RADII);
         self.matcher.forget();
@@ -133,6 +132,15 @@ impl Tracker {
     /// [`TrackError`] if the sizes of the image, the mask and the camera differ, or if the time is
     /// negative or not finite. The tracker then stays as it was.
     pub fn step(
+        &mut self,
+        depth: impl Into<Arc<DepthImage>>,
+        seconds: f64,
+        mask: Option<&Mask>,
+    ) -> Result<Tracked, TrackError> {
+        self.track(&depth.into(), seconds, mask)
+    }
+
+    fn track(
         &mut self,
         depth: &Arc<DepthImage>,
         seconds: f64,

@@ -159,11 +159,10 @@ impl DepthImage {
 
     /// Returns the image of every `factor`-th pixel of every `factor`-th row, from pixel (0, 0).
     ///
-    /// # Panics
-    ///
-    /// If `factor` is 0.
+    /// A factor of 0 counts as 1.
     #[must_use]
     pub fn decimated(&self, factor: u32) -> Self {
+        let factor = factor.max(1);
         let (width, height) = (
             self.width().div_ceil(factor),
             self.height().div_ceil(factor),

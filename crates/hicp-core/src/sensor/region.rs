@@ -106,11 +106,10 @@ impl PixelRegion {
     /// Returns the region of its pixels in an image of every `factor`-th pixel of every `factor`-th
     /// row.
     ///
-    /// # Panics
-    ///
-    /// If `factor` is 0.
+    /// A factor of 0 counts as 1.
     #[must_use]
     pub fn decimated(&self, factor: u32) -> Self {
+        let factor = factor.max(1);
         let [u_min, v_min, u_max, v_max] =
             [self.u_min, self.v_min, self.u_max, self.v_max].map(|edge| edge.div_ceil(factor));
         Self {

@@ -82,7 +82,7 @@ impl Judgment {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a stop rule",
     label = "this must implement `StopRule`",
-    note = "`Icp::stop` accepts a `StopRule`, `()`, a `Vec` of one type (for example `Vec<Box<dyn StopRule>>`), or a tuple of one to eight of them"
+    note = "`Icp::stop` accepts a `StopRule`, `()`, an `Option` or a `Vec` of one type (for example `Vec<Box<dyn StopRule>>`), or a tuple of one to eight of them"
 )]
 pub trait StopRule {
     /// Starts a stage: rules with memory clear it.
@@ -140,27 +140,33 @@ impl StopRule for () {
     fn names(&self, _: &mut Vec<&'static str>) {}
 }
 
-/// Passes every iteration to all rules, as tuples do. The first that does not continue decides.
-impl<T: StopRule> StopRule for Vec<T> {
-    fn start(&mut self) {
-        self.iter_mut().for_each(StopRule::start);
-    }
+macro_rules! list {
+    ($($list:ident),+) => {$(
+        /// Passes every iteration to all rules, as tuples do. The first that does not continue
+        /// decides.
+        impl<T: StopRule> StopRule for $list<T> {
+            fn start(&mut self) {
+                self.iter_mut().for_each(StopRule::start);
+            }
 
-    fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
-        let rules = self.iter_mut();
-        rules.fold(Judgment::Continue, |judgment, rule| {
-            judgment.or(rule.check(iteration, progress))
-        })
-    }
+            fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+                let rules = self.iter_mut();
+                rules.fold(Judgment::Continue, |judgment, rule| {
+                    judgment.or(rule.check(iteration, progress))
+                })
+            }
 
-    fn name(&self) -> &'static str {
-        "any-of"
-    }
+            fn name(&self) -> &'static str {
+                "any-of"
+            }
 
-    fn names(&self, names: &mut Vec<&'static str>) {
-        self.iter().for_each(|rule| rule.names(names));
-    }
+            fn names(&self, names: &mut Vec<&'static str>) {
+                self.iter().for_each(|rule| rule.names(names));
+            }
+        }
+    )+};
 }
+list!(Vec, Option);
 
 macro_rules! any_of {
     ($($member:ident),+) => {

@@ -81,9 +81,10 @@ impl TryFrom<Numbers<9>> for Rotation {
 pub struct PoseFile {
     /// The pose, meters. Its rotation is the one nearest to the numbers of the file.
     pub camera_from_object: Isometry3<f64>,
-    /// `cam_R_m2c`, row-major, as in the file.
+    /// The rotation matrix, row-major: the numbers of `cam_R_m2c` if the file has it, in mm.
+    /// Otherwise it is that of the pose.
     pub rotation: [f64; 9],
-    /// `cam_t_m2c`, millimeters, as in the file.
+    /// The translation, millimeters; the numbers of `cam_t_m2c` if the file has it.
     pub translation_mm: [f64; 3],
 }
 

@@ -1,5 +1,6 @@
 //! The trait of metrics and decorators that a stage can minimize over a set of pairs.
 
+use hicp_core::internal::type_label;
 use hicp_core::{Correspondences, Iteration};
 
 use crate::metric::error_metric::{ErrorMetric, Step};
@@ -81,9 +82,6 @@ use crate::system::normal_equations::NormalEquations;
 ///     ) {
 ///         self.at(pairs).add_squared_errors(iteration, pairs, factor, errors);
 ///     }
-///     fn label(&self) -> &'static str {
-///         "whitened"
-///     }
 /// }
 /// ```
 #[diagnostic::on_unimplemented(
@@ -143,7 +141,9 @@ pub trait Minimize {
 
     /// Returns the name in traces. It is not called `name`, to keep a metric's own `name`
     /// unambiguous.
-    fn label(&self) -> &'static str;
+    fn label(&self) -> &'static str {
+        type_label::<Self>()
+    }
 }
 
 impl<M: ErrorMetric + ?Sized> Minimize for M {

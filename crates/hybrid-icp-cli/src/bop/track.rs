@@ -160,7 +160,7 @@ impl Arguments {
             };
             let clock = Instant::now();
             let passed = f64::from(im_id - std::mem::replace(&mut before, *im_id)) / self.fps;
-            let tracked = tracker.step(&depth, passed, None)?;
+            let tracked = tracker.step(depth, passed, None)?;
             lines.push(Line {
                 im_id: *im_id,
                 tracked,

@@ -156,7 +156,7 @@ impl PyTracker {
         // Release the GIL first: another thread may hold the lock for a whole step.
         let tracked = py.detach(|| {
             let mut tracking = locked(&self.tracking);
-            let tracked = tracking.tracker.step(&depth, seconds, mask.as_ref())?;
+            let tracked = tracking.tracker.step(depth, seconds, mask.as_ref())?;
             tracking.state = tracked.state.name();
             tracking.camera_from_object = tracked.camera_from_object;
             Ok(tracked)

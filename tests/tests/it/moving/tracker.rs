@@ -58,7 +58,7 @@ impl Sequence {
         tracker.start(&self.scene.poses[0]);
         let depths = self.depths.iter();
         depths
-            .map(|depth| tracker.step(depth, seconds, None).unwrap())
+            .map(|depth| tracker.step(Arc::clone(depth), seconds, None).unwrap())
             .collect()
     }
 
@@ -116,7 +116,7 @@ fn times_before_the_previous_image_are_refused() {
     let mut tracker = Tracker::new(sequence.model, camera(), TrackerConfig::default());
     for seconds in [-SECONDS, f64::NAN, f64::INFINITY] {
         let error = tracker
-            .step(&sequence.depths[0], seconds, None)
+            .step(Arc::clone(&sequence.depths[0]), seconds, None)
             .unwrap_err();
         let text = format!("seconds is {seconds}, expected the seconds since the previous image");
         assert!(error.to_string().starts_with(&text), "{error}");
@@ -157,7 +157,7 @@ fn a_mug_that_turns_with_its_handle_behind_is_doubtful() {
     for frame in 0..21 {
         let truth = pose(3.0 * f64::from(frame) - 30.0);
         let (depth, _) = hicp_tests::render(&model, &camera(), &truth);
-        let tracked = tracker.step(&Arc::new(depth), SECONDS, None).unwrap();
+        let tracked = tracker.step(depth, SECONDS, None).unwrap();
         let off = mssd(&tracked.camera_from_object, &truth, &points, &[]) / model.diameter();
         let sure = tracked.state == TrackState::Tracking;
         assert!(!sure || off < 0.1, "{frame}: {off}");
@@ -186,7 +186,7 @@ fn an_object_that_shows_a_flat_side_is_followed() {
         let wall = |z: &f32| if *z > 0.0 { *z } else { 0.8 };
         let depths = depth.pixels().iter().map(wall).collect();
         let depth = DepthImage::from_meters(320, 240, depths).unwrap();
-        let tracked = tracker.step(&Arc::new(depth), SECONDS, None).unwrap();
+        let tracked = tracker.step(depth, SECONDS, None).unwrap();
         let (angle, distance) = se3::pose_distance(&tracked.camera_from_object, &truth);
         assert!(
             distance < 0.003 && angle < 0.01,
@@ -221,7 +221,7 @@ fn images_without_the_object_and_starts_that_are_not_finite_are_never_tracked() 
                 let mut tracker = Tracker::new(model.clone(), camera(), config);
                 tracker.start(&start);
                 for _ in 0..4 {
-                    let tracked = tracker.step(depth, seconds, mask).unwrap();
+                    let tracked = tracker.step(Arc::clone(depth), seconds, mask).unwrap();
                     assert_ne!(tracked.state, TrackState::Tracking, "{start:?} {value}");
                     assert!(se3::is_finite(&tracked.camera_from_object));
                 }
@@ -248,7 +248,7 @@ impl Standing {
     ) {
         let mut tracker = Tracker::new(Arc::clone(model), camera, TrackerConfig::default());
         tracker.start(start);
-        let steps = (0..6).map(|_| tracker.step(depth, SECONDS, None).unwrap());
+        let steps = (0..6).map(|_| tracker.step(Arc::clone(depth), SECONDS, None).unwrap());
         let last = steps.last().unwrap();
         let off = ModelPoints::new(model).mssd(&last.camera_from_object, truth);
         let tracking = last.state == TrackState::Tracking;
@@ -306,6 +306,6 @@ fn images_of_another_size_are_refused() {
     let mut tracker = Tracker::new(model, camera(), TrackerConfig::default());
     let small = Arc::new(DepthImage::from_meters(8, 8, vec![0.7; 64]).unwrap());
     tracker.start(&Isometry3::translation(0.0, 0.0, 0.7));
-    let error = tracker.step(&small, SECONDS, None).unwrap_err();
+    let error = tracker.step(small, SECONDS, None).unwrap_err();
     assert!(error.to_string().contains("8x8"), "{error}");
 }
