@@ -80,8 +80,11 @@ impl Confidence {
     ///
     /// Without a model, an image or a rendered pixel, the probability is 0. It also is 0 if the
     /// model's diameter is impossible, or more than ten times the distance of the surface, because
-    /// the evidence is measured in diameters. Cost: one render
-    /// (shared with other components that use this pose) and about 40 µs. Allocates nothing.
+    /// the evidence is measured in diameters. If the render covers the whole image, it is 0, too:
+    /// no part of the silhouette is compared. This occurs with a mesh of another unit.
+    ///
+    /// Cost: one render (shared with other components that use this pose) and about 40 µs.
+    /// Allocates nothing.
     #[must_use]
     pub fn at(
         context: &mut Context<'_>,
@@ -99,7 +102,10 @@ impl Confidence {
         grid.compare(observation, view);
         find_insides(&mut grid);
         let evidence = Evidence::of(&grid);
-        let judged = model.has_possible_diameter() && grid.distance() >= NEAREST * diameter;
+        let (width, height) = observation.camera().size();
+        let judged = model.has_possible_diameter()
+            && grid.distance() >= NEAREST * diameter
+            && evidence.pixels < width as usize * height as usize;
         let confidence = if judged && evidence.agrees > 0.0 {
             let features = Self::features(&evidence, &Misfit::of(&grid), mve, look_alikes);
             Self::of(&features, diameter)

@@ -110,6 +110,20 @@ fn without_agreement_the_probability_is_zero() {
 }
 
 #[test]
+fn a_render_without_a_silhouette_in_the_image_has_the_probability_zero() {
+    // A cube of 2 m, such as one in another unit, whose front lies on the wall.
+    let (model, observation) = (Model::new(cuboid(2.0, 2.0, 2.0)), scene(|_, z| z));
+    for (aside, seen) in [(0.0, false), (1.1, true)] {
+        let pose = Isometry3::translation(aside, 0.0, f64::from(WALL) + 1.0);
+        let mut renders = RenderCache::new(RayCaster);
+        let mut context = Context::new(Problem::new(&model, &observation), &mut renders);
+        let (evidence, confidence) = Confidence::at(&mut context, &pose, 0.0, 0.0);
+        assert!(evidence.agrees > 0.7, "{evidence:?}");
+        assert_eq!(confidence != Confidence::none(model.diameter()), seen);
+    }
+}
+
+#[test]
 fn features_out_of_range_give_finite_numbers() {
     for x in [f64::NEG_INFINITY, -1.0, 1e9, f64::INFINITY, f64::NAN] {
         let confidence = Confidence::of(&[x; N_FEATURES], 0.1);
