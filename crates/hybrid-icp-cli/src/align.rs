@@ -93,7 +93,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let (mut warnings, mut lengths) = (Vec::new(), Vec::new());
     let max_distance = meters(arguments.max_distance);
-    let mut read = |path: &PathBuf, unit, options: CloudOptions, side| -> anyhow::Result<_> {
+    let mut read = |path: &PathBuf, unit, side| -> anyhow::Result<_> {
         let PointCloud {
             points,
             normals,
@@ -110,12 +110,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         for (name, length) in [("--voxel", options.voxel_meters), ("--max-distance", limit)] {
             lengths.extend(CloudWarning::of_length(name, length, side, &points));
         }
-        Ok(options.cloud(&points, normals.as_deref())?)
+        let normals = normals.as_deref();
+        Ok(match side {
+            CloudSide::Source => options.for_source_of(method).cloud(&points, normals)?,
+            CloudSide::Target => options.target_of(method, &points, normals)?,
+        })
     };
-    let (unit, of_source) = (arguments.unit, options.for_source_of(method));
-    let source = read(&arguments.source, unit, of_source, CloudSide::Source)?;
+    let unit = arguments.unit;
+    let source = read(&arguments.source, unit, CloudSide::Source)?;
     let target_unit = arguments.target_unit.unwrap_or(unit);
-    let target = read(&arguments.target, target_unit, options, CloudSide::Target)?;
+    let target = read(&arguments.target, target_unit, CloudSide::Target)?;
     let init = match init {
         Some(path) => {
             limits()

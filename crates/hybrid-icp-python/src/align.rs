@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use hicp_io::{LengthUnit, PointCloud};
-use hybrid_icp::core::{Cloud, Isometry3, Point3, UnitVector3};
+use hybrid_icp::core::{Isometry3, Point3, UnitVector3};
 use hybrid_icp::icp::{IterationEvent, Observer, Session, Workspace};
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::{CloudOptions, CloudSide, CloudWarning, Registration};
@@ -91,8 +91,13 @@ pub(crate) fn align<'py>(
     let limit = CloudWarning::of_length("max_distance", max_distance, side, &target.points);
     lengths.extend(limit);
     let alignment = py.detach(|| -> PyResult<_> {
-        let source = source.cloud(&options.for_source_of(method))?;
-        let target = target.cloud(&options)?;
+        let of_source = options.for_source_of(method);
+        let source = of_source.cloud(&source.points, source.normals.as_deref());
+        let target = options.target_of(method, &target.points, target.normals.as_deref());
+        let (source, target) = (
+            source.map_err(errors::input)?,
+            target.map_err(errors::input)?,
+        );
         let mut pipeline = method.build(max_distance);
         let mut signals = Signals(Ok(()));
         let mut workspace = Workspace::new(Rasterizer::default());
@@ -192,10 +197,5 @@ impl Points {
             points: array::triples(points, name)?,
             normals: normals.map(|normals| normals.into_iter().map(unit).collect()),
         })
-    }
-
-    fn cloud(&self, options: &CloudOptions) -> PyResult<Cloud> {
-        let cloud = options.cloud(&self.points, self.normals.as_deref());
-        cloud.map_err(errors::input)
     }
 }

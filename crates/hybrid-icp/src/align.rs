@@ -72,6 +72,33 @@ impl CloudOptions {
         }
     }
 
+    /// Creates the target of a registration, as [`CloudOptions::cloud`] does.
+    ///
+    /// If the error does not depend on normals, no point is skipped for lack of one: scans of lines
+    /// and edges determine none. The cloud then has no normals at all.
+    ///
+    /// # Errors
+    ///
+    /// As for [`CloudOptions::cloud`].
+    pub fn target_of(
+        &self,
+        registration: Registration,
+        points: &[Point3<f32>],
+        normals: Option<&[UnitVector3<f32>]>,
+    ) -> Result<Cloud, NormalCount> {
+        let cloud = self.cloud(points, normals)?;
+        if registration != Registration::PointToPoint || cloud.n_skipped() == 0 {
+            return Ok(cloud);
+        }
+        let bare = Self {
+            neighbors: 0,
+            ..*self
+        };
+        let bare = bare.cloud(points, None)?;
+        let more = bare.surfels().len() > cloud.surfels().len();
+        Ok(if more { bare } else { cloud })
+    }
+
     /// Creates a cloud from points in meters, with unit normals if there are any.
     ///
     /// Points that are not finite, lie exactly at (0, 0, 0) or whose normal cannot be estimated are

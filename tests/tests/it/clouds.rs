@@ -507,3 +507,38 @@ fn absent_normals_of_the_source_are_never_used() {
         }
     }
 }
+
+/// A scan of four walls in one plane, as of a laser scanner, determines no normals.
+#[test]
+fn point_to_point_keeps_target_points_without_a_normal() {
+    let wall = |i: u16| (f32::from(i % 100) - 50.0) / 25.0;
+    let walls: Vec<_> = (0..400)
+        .map(|i| match i / 100 {
+            0 => Point3::new(wall(i), 2.0, 1.0),
+            1 => Point3::new(wall(i), -1.5, 1.0),
+            2 => Point3::new(2.0, wall(i), 1.0),
+            _ => Point3::new(-2.0, wall(i), 1.0),
+        })
+        .collect();
+    let truth = pose([0.0, 0.0, 0.004], [0.004, -0.003, 0.0]);
+    let (options, moved) = (CloudOptions::default(), moved(&walls, &truth));
+    let register = |kind: Registration| {
+        let source = options.for_source_of(kind).cloud(&walls, None).unwrap();
+        let target = options.target_of(kind, &moved, None).unwrap();
+        align(
+            &source,
+            &target,
+            &Isometry3::identity(),
+            &mut kind.build(None),
+        )
+    };
+    let found = register(Registration::PointToPoint);
+    let (angle, distance) = se3::pose_distance(&found.target_from_source(), &truth);
+    assert!(angle < 1e-4 && distance < 1e-4, "{angle} {distance}");
+    assert_eq!((found.fitness(), found.warnings), (1.0, vec![]));
+    // The other errors need normals, so they skip points, with a warning.
+    for kind in [Registration::PointToPlane, Registration::Generalized] {
+        let skipped = |w: &CloudWarning| matches!(w, CloudWarning::PointsSkipped { .. });
+        assert!(register(kind).warnings.iter().any(skipped), "{kind:?}");
+    }
+}
