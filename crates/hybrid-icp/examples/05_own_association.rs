@@ -4,7 +4,8 @@
 
 use std::error::Error;
 
-use hybrid_icp::core::RigidTransform;
+use hybrid_icp::association::DataAssociation;
+use hybrid_icp::core::{Context, Correspondences, Pair, RigidTransform, Surfel};
 use hybrid_icp::prelude::*;
 
 mod scene;

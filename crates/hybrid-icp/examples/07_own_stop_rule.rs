@@ -4,6 +4,8 @@
 
 use std::error::Error;
 
+use hybrid_icp::core::Iteration;
+use hybrid_icp::icp::{Judgment, Progress, StopRule, Termination};
 use hybrid_icp::prelude::*;
 
 mod scene;

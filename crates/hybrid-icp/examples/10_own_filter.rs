@@ -4,6 +4,8 @@
 
 use std::error::Error;
 
+use hybrid_icp::association::{MaxNormalAngle, OutlierFilter};
+use hybrid_icp::core::{Correspondences, Iteration};
 use hybrid_icp::prelude::*;
 
 mod scene;

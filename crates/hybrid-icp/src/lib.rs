@@ -122,27 +122,22 @@ pub use trace::{StageRecord, Trace};
 pub use tracker::{TrackError, TrackState, Tracked, Tracker, TrackerConfig};
 pub use warning::{CenterFault, Warning};
 
-/// The names that most programs and most custom components need: `use hybrid_icp::prelude::*;`.
+/// The names that refine a pose and compose the paper's pipeline: `use hybrid_icp::prelude::*;`.
 ///
-/// Everything else is in the modules.
+/// Everything else is in the modules. The traits of custom parts are in those of
+/// [their roles](crate#parts-by-role).
 pub mod prelude {
     pub use crate::{Preset, Refinement, Refiner, presets};
     pub use hicp_association::{
-        AllSamples, DataAssociation, MaxDistance, MaxNormalAngle, NearestNeighbor, OutlierFilter,
-        PointSelection, Projective, VisibleSurface,
+        AllSamples, MaxDistance, NearestNeighbor, Projective, VisibleSurface,
     };
     pub use hicp_core::{
-        Context, Correspondences, DepthImage, Isometry3, Iteration, Mask, Model, Observation, Pair,
-        PinholeCamera, Point3, Problem, Surfel, TriMesh, Vector3,
+        DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, TriMesh, Vector3,
     };
-    pub use hicp_fusion::Fuser;
     pub use hicp_icp::{
-        Cascade, Convergence, Divergence, Icp, IterationLimit, Judgment, Outcome, Progress, Repeat,
-        Session, SmallMotion, Stage, StopRule, Termination, Verdict,
+        Cascade, Convergence, Divergence, Icp, IterationLimit, Repeat, SmallMotion,
     };
-    pub use hicp_metric::{
-        ErrorMetric, Kernel, NormalEquations, PointToPlane, PointToPoint, Robust, Scale,
-    };
-    pub use hicp_score::{MeanVsd, Score};
-    pub use hicp_switch::{Switch, Switcher, Threshold};
+    pub use hicp_metric::{PointToPlane, PointToPoint};
+    pub use hicp_score::MeanVsd;
+    pub use hicp_switch::{Switch, Threshold};
 }
