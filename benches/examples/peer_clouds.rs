@@ -63,7 +63,7 @@ fn simulate(number: usize, folder: &Path) -> Result<Value, Failure> {
 }
 
 /// Registers two clouds; the normals and the search trees are built from the points.
-fn run(method: Registration, gate: f32, folder: &Path) -> Result<Value, Failure> {
+fn run(method: Registration, gate: f64, folder: &Path) -> Result<Value, Failure> {
     let meta: Value = serde_json::from_slice(&std::fs::read(folder.join("meta.json"))?)?;
     let init: Vec<f64> = serde_json::from_value(meta["init"].clone())?;
     let init = Matrix4::from_row_slice(&init);

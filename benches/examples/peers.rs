@@ -34,7 +34,7 @@ use serde_json::{Value, json};
 /// Maximum distance of a pair in all stages, meters.
 ///
 /// It is larger than the error of any start. The other libraries use the same value.
-const GATE_METERS: f32 = 0.03;
+const GATE_METERS: f64 = 0.03;
 
 /// Stop rule: the next increment is below 0.1 mm and 0.01°, or there were 100 evaluations.
 const STOP: (SmallMotion, IterationLimit) = (

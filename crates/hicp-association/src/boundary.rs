@@ -21,14 +21,14 @@ impl BoundaryRule {
     ///
     /// The depth of a tilted surface on the optical axis changes by tan(tilt)/f of its value from
     /// one pixel to the next. f is the smaller focal length in pixels.
-    pub(crate) fn new(width: u32, max_tilt_degrees: f32, camera: &PinholeCamera) -> Self {
+    pub(crate) fn new(width: u32, max_tilt_degrees: f64, camera: &PinholeCamera) -> Self {
         let focal = camera.fx().min(camera.fy());
         #[allow(clippy::cast_possible_truncation)]
         // A relative step; f32 is the precision of depth.
         let max_step = if max_tilt_degrees >= 90.0 {
             f32::INFINITY
         } else {
-            (f64::from(max_tilt_degrees).to_radians().tan() / focal) as f32
+            (max_tilt_degrees.to_radians().tan() / focal) as f32
         };
         Self { width, max_step }
     }

@@ -9,9 +9,9 @@ use hicp_core::Problem;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Length {
     /// A length in meters.
-    Meters(f32),
+    Meters(f64),
     /// A fraction of the diameter of the model or source cloud.
-    Diameters(f32),
+    Diameters(f64),
 }
 
 impl Length {
@@ -22,11 +22,16 @@ impl Length {
     #[must_use]
     pub fn meters(self, problem: &Problem<'_>) -> f32 {
         match self {
-            Self::Meters(length) => length,
-            #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-            Self::Diameters(fraction) => problem
-                .source()
-                .map_or(f32::NAN, |source| fraction * source.diameter() as f32),
+            Self::Meters(length) => narrow(length),
+            Self::Diameters(fraction) => problem.source().map_or(f32::NAN, |source| {
+                narrow(fraction) * narrow(source.diameter())
+            }),
         }
     }
+}
+
+/// Rounds a parameter to the precision of buffers.
+#[allow(clippy::cast_possible_truncation)]
+pub(crate) fn narrow(parameter: f64) -> f32 {
+    parameter as f32
 }

@@ -56,7 +56,6 @@ pub use error::{PipelineError, Place};
 pub use file::PipelineFile;
 pub use kind::{BoxedPart, PartKind};
 pub use limits::PipelineLimits;
-pub use parameters::Number;
 pub use part::{Accepts, Parameter, Part};
 pub use range::Range;
 pub use work::Limited;

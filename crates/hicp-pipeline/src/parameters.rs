@@ -6,42 +6,22 @@ use crate::part::{Accepts, Parameter};
 use crate::range::Range;
 use crate::value::{integer, list, number};
 
-/// A type of numbers that a part can hold: `f32` or `f64`.
-pub trait Number {
-    /// Converts the number of a file.
-    fn of(number: f64) -> Self;
-}
-
-impl Number for f64 {
-    fn of(number: f64) -> Self {
-        number
-    }
-}
-
-impl Number for f32 {
-    #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-    fn of(number: f64) -> Self {
-        number as Self
-    }
-}
-
 impl Parameters<'_> {
     /// Reads a number; without a default it is required.
-    pub fn number<T: Number>(
+    pub fn number(
         &mut self,
         name: &'static str,
         range: Range,
         default: impl Into<Option<f64>>,
         meaning: &'static str,
-    ) -> Result<T, PipelineError> {
+    ) -> Result<f64, PipelineError> {
         let Range { min, max, unit } = range;
         let default = default.into();
         let accepts = Accepts::Number { min, max, default };
         let parameter = Parameter::new(name, unit, meaning, accepts);
-        let accepted = self.read(parameter, default, min, |value| {
+        self.read(parameter, default, min, |value| {
             number(value).filter(|number| (min..=max).contains(number))
-        });
-        accepted.map(T::of)
+        })
     }
 
     /// Reads a whole number of at least `min`, as `u32`, `u64` or `usize`.

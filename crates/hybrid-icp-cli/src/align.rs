@@ -85,14 +85,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .reads("--init", init)
         .check_in_place("--output", "--init")?;
     let method = arguments.method;
-    #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
-    let meters = |length: Option<f64>| length.map(|length| length as f32);
     let options = CloudOptions {
-        voxel_meters: meters(arguments.voxel),
+        voxel_meters: arguments.voxel,
         neighbors: arguments.neighbors,
     };
     let (mut warnings, mut lengths) = (Vec::new(), Vec::new());
-    let max_distance = meters(arguments.max_distance);
     let mut read = |path: &PathBuf, unit, side| -> anyhow::Result<_> {
         let PointCloud {
             points,
@@ -106,7 +103,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 points.len() + n_skipped
             ));
         }
-        let limit = max_distance.filter(|_| side == CloudSide::Target);
+        let limit = arguments.max_distance.filter(|_| side == CloudSide::Target);
         for (name, length) in [("--voxel", options.voxel_meters), ("--max-distance", limit)] {
             lengths.extend(CloudWarning::of_length(name, length, side, &points));
         }
@@ -128,7 +125,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         None => Isometry3::identity(),
     };
-    let mut pipeline = method.build(max_distance);
+    let mut pipeline = method.build(arguments.max_distance);
     let found = align(&source, &target, &init, &mut pipeline);
 
     let in_words = |warning: &CloudWarning| match warning {

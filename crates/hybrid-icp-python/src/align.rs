@@ -57,8 +57,8 @@ pub(crate) fn align<'py>(
     source_normals: Option<&Bound<'_, PyAny>>,
     target_normals: Option<&Bound<'_, PyAny>>,
     method: &str,
-    max_distance: Option<f32>,
-    voxel: Option<f32>,
+    max_distance: Option<f64>,
+    voxel: Option<f64>,
     neighbors: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
     let method: Registration = method.parse().map_err(errors::input)?;

@@ -32,14 +32,14 @@ const LITTLE_OVERLAP: f64 = 0.3;
 const FROZEN: f64 = 0.005;
 
 /// Gates of a registration without a stated one, as shares of the source's diameter.
-const GATES: [f32; 2] = [0.1, 0.02];
+const GATES: [f64; 2] = [0.1, 0.02];
 
 /// The preparation of points for a registration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CloudOptions {
     /// Edge of the cubic cells in which points are replaced by their mean, meters; `None` keeps all
     /// points ([`voxel_downsample`]).
-    pub voxel_meters: Option<f32>,
+    pub voxel_meters: Option<f64>,
     /// Number of neighbors from which absent normals are estimated ([`estimate_normals`]).
     ///
     /// 0 leaves them out ([`Cloud::without_normals`]). Use it for sources only:
@@ -203,7 +203,7 @@ impl Registration {
     /// `None` runs twice, with a tenth and with a fiftieth of the source's diameter: it bridges
     /// large offsets, and then leaves out points without a counterpart.
     #[must_use]
-    pub fn build(self, max_distance: Option<f32>) -> BoxedStage {
+    pub fn build(self, max_distance: Option<f64>) -> BoxedStage {
         match self {
             Self::PointToPoint => stages(PointToPoint, max_distance),
             Self::PointToPlane => {
@@ -220,7 +220,7 @@ impl Registration {
     }
 }
 
-fn stages<M>(metric: M, max_distance: Option<f32>) -> BoxedStage
+fn stages<M>(metric: M, max_distance: Option<f64>) -> BoxedStage
 where
     M: Minimize + Clone + Send + 'static,
 {

@@ -294,7 +294,7 @@ fn lengths_beyond_the_extent_are_named() {
     let far = moved(&points(500), &Isometry3::translation(30.0, 0.0, 0.0));
     let far = [&far[..], &[Point3::origin()]].concat();
     let warned = |meters| CloudWarning::of_length("voxel", Some(meters), CloudSide::Target, &far);
-    assert_eq!((warned(0.05), warned(f32::NAN)), (None, None));
+    assert_eq!((warned(0.05), warned(f64::NAN)), (None, None));
     let text = warned(2.0).unwrap().to_string();
     assert!(
         text.starts_with("voxel is 2.0000 m, more than the extent of the target, 0."),
@@ -461,7 +461,7 @@ fn voxels_hold_the_mean_of_their_points() {
     let points = points.map(Point3::from);
     let (means, _) = voxel_downsample(&points, None, 1.0);
     assert_eq!(means, [Point3::new(0.15, 0.0, 0.0), points[2]]);
-    for edge in [0.0, -1.0, f32::NAN, 1e-9] {
+    for edge in [0.0, -1.0, f64::NAN, 1e-9] {
         assert_eq!(voxel_downsample(&points, None, edge).0.len(), 4);
     }
     assert_eq!(voxel_downsample(&[], None, 1.0).0, []);

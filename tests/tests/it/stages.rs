@@ -102,7 +102,7 @@ impl Observer for PairCounts {
 #[test]
 fn a_schedule_applies_one_filter_per_iteration_and_restarts_with_each_run() {
     let (scene, init) = case(Household::Mug, 3, 0.004, 0.05);
-    let gates = [0.5_f32, 0.02, 0.01, 0.3];
+    let gates = [0.5, 0.02, 0.01, 0.3];
     let mut stage = Icp {
         selection: VisibleSurface::default(),
         association: Projective,

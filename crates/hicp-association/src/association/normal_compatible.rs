@@ -24,7 +24,7 @@ use crate::stride::Stride;
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalCompatible {
     /// Largest angle between the two normals, degrees. NaN and negative values pair nothing.
-    pub max_angle_degrees: f32,
+    pub max_angle_degrees: f64,
     /// Number of closest observed points to consider. 0 counts as 1.
     pub k: usize,
     /// The observed pixels to search.
@@ -35,7 +35,7 @@ pub struct NormalCompatible {
 impl NormalCompatible {
     /// Creates the association.
     #[must_use]
-    pub fn new(max_angle_degrees: f32, k: usize, targets: Stride) -> Self {
+    pub fn new(max_angle_degrees: f64, k: usize, targets: Stride) -> Self {
         Self {
             max_angle_degrees,
             k,

@@ -7,6 +7,7 @@ use hicp_core::{
 
 use crate::association::data_association::DataAssociation;
 use crate::association::pixel_projection::PixelProjection;
+use crate::length::narrow;
 
 /// Pairs a model point with the observed surface at the exact position that it projects to.
 ///
@@ -26,7 +27,7 @@ pub struct ProjectiveInterpolated {
     /// depth.
     ///
     /// With 0, only equal depths are interpolated; with negative values and NaN, none are.
-    pub max_step: f32,
+    pub max_step: f64,
 }
 
 impl Default for ProjectiveInterpolated {
@@ -83,7 +84,7 @@ fn interpolate(
     u: f32,
     v: f32,
     nearest: &Surfel,
-    max_step: f32,
+    max_step: f64,
 ) -> Option<Surfel> {
     let (left, top) = (u.floor(), v.floor());
     let (right_share, bottom_share) = (u - left, v - top);
@@ -93,7 +94,7 @@ fn interpolate(
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     // The position is inside the image, and the sign was checked.
     let (left, top) = (left as u32, top as u32);
-    let gate = max_step * nearest.point.z;
+    let gate = narrow(max_step) * nearest.point.z;
     let mut inverse_depth = 0.0;
     let mut normal = nearest.normal.into_inner() * 0.0;
     for (du, u_share) in [(0, 1.0 - right_share), (1, right_share)] {

@@ -22,11 +22,11 @@ const MAX_CELLS: f64 = (1 << 21) as f64;
 pub fn voxel_downsample(
     points: &[Point3<f32>],
     normals: Option<&[UnitVector3<f32>]>,
-    edge: f32,
+    edge: f64,
 ) -> (Vec<Point3<f32>>, Option<Vec<UnitVector3<f32>>>) {
     let finite = |p: &&Point3<f32>| p.iter().all(|x| x.is_finite());
     let [min, max] = bounds(points.iter().filter(finite).copied()).unwrap_or_default();
-    let inverse = 1.0 / f64::from(edge);
+    let inverse = 1.0 / edge;
     let cells = (max.cast::<f64>() - min.cast::<f64>()).max() * inverse;
     let fits = edge > 0.0 && cells < MAX_CELLS;
     if !fits {

@@ -37,7 +37,7 @@ pub struct BoundaryTargets {
     /// Largest tilt of a surface against the image plane, degrees. A steeper step is a depth edge.
     ///
     /// From 90 on, nothing is. With NaN and negative values everything is, unless `width` is 0.
-    pub max_tilt_degrees: f32,
+    pub max_tilt_degrees: f64,
 }
 
 impl Default for BoundaryTargets {

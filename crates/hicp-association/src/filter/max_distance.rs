@@ -20,7 +20,7 @@ impl MaxDistance {
 
     /// Creates the filter with a limit in meters. NaN or a negative limit removes every pair.
     #[must_use]
-    pub fn meters(limit: f32) -> Self {
+    pub fn meters(limit: f64) -> Self {
         Self(Length::Meters(limit))
     }
 
@@ -28,7 +28,7 @@ impl MaxDistance {
     ///
     /// It then fits objects of any size.
     #[must_use]
-    pub fn diameters(fraction: f32) -> Self {
+    pub fn diameters(fraction: f64) -> Self {
         Self(Length::Diameters(fraction))
     }
 }

@@ -3,6 +3,7 @@
 use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
+use crate::length::narrow;
 
 /// Removes pairs whose normals differ by more than θ_max (§III-A.1; Pulli 1999).
 ///
@@ -17,7 +18,7 @@ impl MaxNormalAngle {
     ///
     /// A limit of 180 or more keeps every pair. NaN or a negative limit removes every pair.
     #[must_use]
-    pub fn degrees(limit: f32) -> Self {
+    pub fn degrees(limit: f64) -> Self {
         Self {
             min_cosine: min_cosine(limit),
         }
@@ -37,13 +38,13 @@ impl OutlierFilter for MaxNormalAngle {
 /// Returns the least n·m of unit normals that differ by at most `degrees`.
 ///
 /// For NaN and negative angles, it is greater than every product.
-pub(crate) fn min_cosine(degrees: f32) -> f32 {
+pub(crate) fn min_cosine(degrees: f64) -> f32 {
     if degrees >= 180.0 {
         // Rounding may put the cosine of opposite normals just below −1 …
         -2.0
     } else if degrees >= 0.0 {
         // … and that of equal ones just below 1.
-        degrees.to_radians().cos() - 1e-6
+        narrow(degrees).to_radians().cos() - 1e-6
     } else {
         f32::INFINITY
     }

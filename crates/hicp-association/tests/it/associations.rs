@@ -137,7 +137,7 @@ proptest! {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
         let source = Random::new(seed).surfels(40, 0.08);
         let pose = scene.nearby(seed);
-        let pairs = scene.associate(&mut NormalCompatible::new(angle, 8, ALL), &source, &pose);
+        let pairs = scene.associate(&mut NormalCompatible::new(f64::from(angle), 8, ALL), &source, &pose);
         assert_well_formed(&scene, &source, &pose, pairs.as_slice());
         let targets = scene.targets(1);
         let expected: Vec<Pair> = (0..).zip(moved(&source, &pose)).filter_map(|(i, source)| {
@@ -154,7 +154,7 @@ proptest! {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
         let source = Random::new(seed).surfels(40, 0.08);
         let pose = scene.nearby(seed);
-        let limit = Some(Length::Meters(offset));
+        let limit = Some(Length::Meters(f64::from(offset)));
         let pairs = scene.associate(&mut NormalShooting::new(9, limit, ALL), &source, &pose);
         assert_well_formed(&scene, &source, &pose, pairs.as_slice());
         let free = scene.associate(&mut NormalShooting::new(9, None, ALL), &source, &pose);
@@ -405,7 +405,7 @@ fn nothing_is_interpolated_across_an_edge() {
     let pairs = scene.associate(&mut association, &source[..1], &identity);
     let z = pairs.as_slice()[0].target.point.z;
     assert!(z > 0.5 && z < 0.6, "{z}");
-    association.max_step = f32::NAN;
+    association.max_step = f64::NAN;
     let pairs = scene.associate(&mut association, &[at(20.4, 20.4)], &identity);
     assert_eq!(
         pairs.as_slice()[0].target.point,

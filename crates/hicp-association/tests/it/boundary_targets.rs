@@ -24,9 +24,9 @@ fn boundary_targets_equal_their_definition() {
             (2, 60.0),
             (1, 85.0),
             (1, 90.0),
-            (1, f32::NAN),
+            (1, f64::NAN),
         ] {
-            let slope = f64::from(max_tilt_degrees).to_radians().tan();
+            let slope = f64::to_radians(max_tilt_degrees).tan();
             let max_step = (slope / focal) as f32;
             let reach = i64::from(width);
             let expected: Vec<Pair> = pairs

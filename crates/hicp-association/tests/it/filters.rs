@@ -53,15 +53,18 @@ fn kept(filter: &mut dyn OutlierFilter, pairs: &[Pair]) -> Vec<u32> {
 fn distances_up_to_the_limit_are_kept() {
     let limit = 0.125_f32;
     let pairs = [0.0, limit.next_down(), limit, limit.next_up(), 1.0].map(|d| pair(d, 0.0));
-    assert_eq!(kept(&mut MaxDistance::meters(limit), &pairs), [0, 1, 2]);
+    assert_eq!(
+        kept(&mut MaxDistance::meters(f64::from(limit)), &pairs),
+        [0, 1, 2]
+    );
     // A quarter of a diameter of 0.5 m.
     assert_eq!(kept(&mut MaxDistance::diameters(0.25), &pairs), [0, 1, 2]);
     assert_eq!(
-        kept(&mut MaxDistance::meters(f32::INFINITY), &pairs),
+        kept(&mut MaxDistance::meters(f64::INFINITY), &pairs),
         [0, 1, 2, 3, 4]
     );
     assert_eq!(kept(&mut MaxDistance::meters(0.0), &pairs), [0]);
-    for none in [-1.0, f32::NAN] {
+    for none in [-1.0, f64::NAN] {
         assert_eq!(kept(&mut MaxDistance::meters(none), &pairs), [0_u32; 0]);
         assert_eq!(kept(&mut MaxDistance::diameters(none), &pairs), [0_u32; 0]);
     }
@@ -75,10 +78,10 @@ fn angles_up_to_the_limit_are_kept() {
     assert_eq!(at(30.0), [0, 1, 2]);
     assert_eq!(at(90.0), [0, 1, 2, 3, 4]);
     assert_eq!(at(0.0), [0]);
-    for all in [180.0, 360.0, f32::INFINITY] {
+    for all in [180.0, 360.0, f64::INFINITY] {
         assert_eq!(at(all), [0, 1, 2, 3, 4, 5, 6, 7]);
     }
-    for none in [-1.0, f32::NAN] {
+    for none in [-1.0, f64::NAN] {
         assert_eq!(at(none), [0_u32; 0]);
     }
 }

@@ -51,7 +51,7 @@ fn indices(pairs: &[Pair]) -> Vec<u32> {
 /// Filters that depend on distances, with their defaults.
 fn distance_filters() -> Vec<Box<dyn OutlierFilter>> {
     vec![
-        Box::new(MaxDistance::new(Length::Meters(f32::INFINITY))),
+        Box::new(MaxDistance::new(Length::Meters(f64::INFINITY))),
         Box::new(MedianDistance::default()),
         Box::new(MadDistance::default()),
         Box::new(MadDistance::new(3.0, 0.0)),
@@ -124,13 +124,13 @@ fn weights_stay_finite_and_not_negative() {
     pairs[5].target.point.z = f32::NAN;
     pairs[6].target.normal = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
     let noise = SensorNoise {
-        constant: f32::NAN,
-        linear: f32::INFINITY,
+        constant: f64::NAN,
+        linear: f64::INFINITY,
         ..SensorNoise::stereo()
     };
     let mut filters = all_filters();
     filters.push(Box::new(SensorNoiseWeight { noise }));
-    filters.push(Box::new(ConstantWeight { weight: f32::NAN }));
+    filters.push(Box::new(ConstantWeight { weight: f64::NAN }));
     filters.push(Box::new(ConstantWeight { weight: -1.0 }));
     for (name, mut filter) in filters.into_iter().enumerate() {
         for list in [&pairs[..], &pairs[..1], &[]] {
@@ -169,16 +169,16 @@ proptest! {
         let pairs = pairs_at(&d);
         let median = |values: &[f32]| sorted(values)[values.len() / 2];
         let center = median(&d);
-        prop_assert_eq!(run(MedianDistance::new(factor), &pairs), within(&pairs, factor * center));
+        prop_assert_eq!(run(MedianDistance::new(f64::from(factor)), &pairs), within(&pairs, factor * center));
         let spread: Vec<f32> = d.iter().map(|d| (d - center).abs()).collect();
         let limit = center + factor * (1.4826 * median(&spread)).max(floor);
-        prop_assert_eq!(run(MadDistance::new(factor, floor), &pairs), within(&pairs, limit));
+        prop_assert_eq!(run(MadDistance::new(f64::from(factor), f64::from(floor)), &pairs), within(&pairs, limit));
     }
 
     #[test]
     fn trimmed_keeps_the_closest_share(d in distances(), percent in 0_u8..110) {
         let pairs = pairs_at(&d);
-        let kept = run(Trimmed::new(f32::from(percent) / 100.0), &pairs);
+        let kept = run(Trimmed::new(f64::from(percent) / 100.0), &pairs);
         // In integers: ⌈percent·n/100⌉
         let count = (usize::from(percent.min(100)) * d.len()).div_ceil(100);
         let limit = count.checked_sub(1).map_or(f32::NAN, |rank| sorted(&d)[rank]);
@@ -187,13 +187,13 @@ proptest! {
     }
 
     #[test]
-    fn var_trimmed_minimizes_the_fractional_rmsd(d in distances(), lambda in 0.1_f32..3.0) {
+    fn var_trimmed_minimizes_the_fractional_rmsd(d in distances(), lambda in 0.1..3.0) {
         let pairs = pairs_at(&d);
         let kept = run(VarTrimmed::new(0.1, 0.9, lambda), &pairs);
         let (sorted, n) = (sorted(&d), d.len() as f64);
         let frmsd = |k: usize| {
             let sum: f64 = sorted[..k].iter().map(|d| f64::from(*d).powi(2)).sum();
-            (k as f64 / n).powf(-f64::from(lambda)) * (sum / k as f64).sqrt()
+            (k as f64 / n).powf(-lambda) * (sum / k as f64).sqrt()
         };
         let fewest = d.len().div_ceil(10);
         let most = (9 * d.len()).div_ceil(10).max(fewest);
@@ -256,7 +256,7 @@ proptest! {
 #[test]
 fn parameters_out_of_range_act_as_documented() {
     let pairs = pairs_at(&[0.001, 0.002, 0.003, 0.004]);
-    for nothing in [f32::NAN, -1.0] {
+    for nothing in [f64::NAN, -1.0] {
         assert!(run(MedianDistance::new(nothing), &pairs).is_empty());
         assert!(run(Trimmed::new(nothing), &pairs).is_empty());
         assert!(run(MaxDistance::meters(nothing), &pairs).is_empty());
@@ -268,17 +268,17 @@ fn parameters_out_of_range_act_as_documented() {
         );
         assert!(weights.len() == 4 && weights.iter().all(|p| p.weight == 0.0));
     }
-    assert!(run(MadDistance::new(f32::NAN, 0.0), &pairs).is_empty());
-    assert_eq!(run(MadDistance::new(0.0, f32::NAN), &pairs).len(), 3);
+    assert!(run(MadDistance::new(f64::NAN, 0.0), &pairs).is_empty());
+    assert_eq!(run(MadDistance::new(0.0, f64::NAN), &pairs).len(), 3);
     assert!(run(Trimmed::new(0.0), &pairs).is_empty());
     assert_eq!(run(Trimmed::new(7.0), &pairs).len(), 4);
     assert_eq!(run(Trimmed::new(1.0e-6), &pairs).len(), 1);
     assert_eq!(run(VarTrimmed::new(0.5, 0.1, 0.95), &pairs).len(), 2);
     assert_eq!(
-        run(VarTrimmed::new(f32::NAN, f32::NAN, 0.95), &pairs).len(),
+        run(VarTrimmed::new(f64::NAN, f64::NAN, 0.95), &pairs).len(),
         1
     );
-    assert_eq!(run(VarTrimmed::new(0.1, 1.0, f32::NAN), &pairs).len(), 4);
+    assert_eq!(run(VarTrimmed::new(0.1, 1.0, f64::NAN), &pairs).len(), 4);
 }
 
 #[test]
@@ -306,11 +306,11 @@ fn weights_multiply() {
     let weights = |filtered: Vec<Pair>| filtered.iter().map(|p| p.weight).collect::<Vec<_>>();
     let constant = |weight| weights(run(ConstantWeight { weight }, &pairs));
     assert_eq!(constant(0.25), [0.5; 4]);
-    assert_eq!(constant(f32::INFINITY), [0.0; 4]);
+    assert_eq!(constant(f64::INFINITY), [0.0; 4]);
     let distance = |max| weights(run(DistanceWeight { max }, &pairs));
     assert_eq!(distance(Length::Meters(0.02)), [2.0, 1.0, 0.0, 0.0]);
     // A twentieth of the diameter, and the same in meters.
-    let meters = 0.05 * scene().model.diameter() as f32;
+    let meters = 0.05 * scene().model.diameter();
     assert_eq!(
         distance(Length::Diameters(0.05)),
         distance(Length::Meters(meters))
@@ -388,5 +388,5 @@ fn strides_and_lengths_accept_any_value() {
     let scene = scene();
     let problem = scene.problem();
     assert_eq!(Length::Meters(-1.0).meters(&problem), -1.0);
-    assert!(Length::Diameters(f32::NAN).meters(&problem).is_nan());
+    assert!(Length::Diameters(f64::NAN).meters(&problem).is_nan());
 }

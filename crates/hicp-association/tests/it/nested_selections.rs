@@ -161,7 +161,7 @@ proptest! {
         let mut random = Random::new(seed);
         let mut surfels = random.surfels(120, 0.1);
         let grid = |surfels: &[Surfel]| {
-            select_fixed(&mut VoxelGrid::new(Fixed(surfels.to_vec()), Length::Meters(cell)))
+            select_fixed(&mut VoxelGrid::new(Fixed(surfels.to_vec()), Length::Meters(f64::from(cell))))
         };
         let chosen = grid(&surfels);
         // Squared distances in units of cells may tie up to rounding, so compare kept points by
@@ -307,9 +307,9 @@ fn without_boundary_equals_its_definition() {
         let all = scene.select(&mut VisibleSurface::with_stride(stride), &pose);
         let camera = scene.observation.camera();
         let focal = camera.fx().min(camera.fy());
-        for (width, max_tilt_degrees) in [(0, 60.0), (1, 60.0), (2, 45.0), (1, 85.0), (3, f32::NAN)]
+        for (width, max_tilt_degrees) in [(0, 60.0), (1, 60.0), (2, 45.0), (1, 85.0), (3, f64::NAN)]
         {
-            let slope = f64::from(max_tilt_degrees).to_radians().tan();
+            let slope = f64::to_radians(max_tilt_degrees).tan();
             let max_step = (slope / focal) as f32;
             let inner = VisibleSurface::with_stride(stride);
             let mut selection = WithoutBoundary {

@@ -173,7 +173,7 @@ fn a_weighted_residual_is_the_error_of_depth() {
     let limit = 0.02;
     let mut association = RenderedSurface {
         stride: Stride::Pixels(2),
-        limit: Length::Meters(limit),
+        limit: Length::Meters(f64::from(limit)),
     };
     let pose = Translation3::new(0.0, 0.0, 0.004) * scene.truth;
     let pairs = scene.pairs(&mut association, &observation, &pose);

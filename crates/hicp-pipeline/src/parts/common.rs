@@ -22,7 +22,7 @@ pub(super) fn length(
 ) -> Result<Length, PipelineError> {
     let length = p.number(name, OF_UNIT, default, meaning)?;
     let units = [
-        ("diameters", Length::Diameters as fn(f32) -> Length),
+        ("diameters", Length::Diameters as fn(f64) -> Length),
         ("meters", Length::Meters),
     ];
     Ok(p.word("unit", &units, "unit of the length")?(length))

@@ -162,11 +162,11 @@ impl CloudWarning {
     #[must_use]
     pub fn of_length(
         name: &'static str,
-        meters: Option<f32>,
+        meters: Option<f64>,
         side: CloudSide,
         points: &[Point3<f32>],
     ) -> Option<Self> {
-        let meters = f64::from(meters?);
+        let meters = meters?;
         let [low, high] = bounds(points.iter().copied().filter(is_measured))?;
         let extent_meters = f64::from((high - low).norm());
         (meters > extent_meters).then_some(Self::TooLong {

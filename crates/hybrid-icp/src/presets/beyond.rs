@@ -62,11 +62,11 @@ pub type Search = SearchFrom<Local>;
 pub type SearchFrom<S> = HypothesisSearch<S, Align, Explore, Fit, SampledMve, MeanVsd, Doubt>;
 
 /// τ_max of projective pairs, as a fraction of the diameter.
-const TAU_DIAMETERS: f32 = 0.25;
+const TAU_DIAMETERS: f64 = 0.25;
 /// Largest difference of depth in the fit of doubtful poses, which may be farther from the surface.
-const WIDE_DIAMETERS: f32 = 0.25;
+const WIDE_DIAMETERS: f64 = 0.25;
 /// θ_max of nearest neighbors, degrees.
-const THETA_DEGREES: f32 = 90.0;
+const THETA_DEGREES: f64 = 90.0;
 /// Observability below which a direction stays as it is, relative to the best determined one. Noise
 /// and contours raise that of a can's axis above the default of 0.001.
 const UNDETERMINED: f64 = 0.005;

@@ -18,9 +18,9 @@ pub(crate) fn nth_smallest(values: &mut [f32], rank: usize) -> Option<f32> {
 }
 
 /// Returns ⌈fraction·count⌉, between 0 and `count`; 0 for NaN.
-pub(crate) fn share_of(fraction: f32, count: usize) -> usize {
-    // The f32 nearest to 0.85 lies above it, but 85 of 100 are meant.
-    let share = (f64::from(fraction.clamp(0.0, 1.0)) * count as f64 * (1.0 - 1e-7)).ceil();
+pub(crate) fn share_of(fraction: f64, count: usize) -> usize {
+    // In floating point, 0.07·100 is more than 7, but 7 of 100 are meant.
+    let share = (fraction.clamp(0.0, 1.0) * count as f64 * (1.0 - 1e-7)).ceil();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     // Between 0 and `count`; NaN becomes 0.
     let share = share as usize;

@@ -6,6 +6,7 @@ use hicp_core::{Correspondences, Iteration};
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::filter::quantile::distances::collect_finite;
+use crate::length::narrow;
 
 /// σ of a normal distribution, divided by its median absolute deviation.
 const SIGMA_PER_MAD: f32 = 1.4826;
@@ -22,16 +23,16 @@ const SIGMA_PER_MAD: f32 = 1.4826;
 #[derive(Clone, Debug, PartialEq)]
 pub struct MadDistance {
     /// Number of standard deviations above the median. NaN removes every pair.
-    pub factor: f32,
+    pub factor: f64,
     /// Smallest assumed standard deviation, meters. NaN and negative values count as 0.
-    pub floor: f32,
+    pub floor: f64,
     distances: Scratch<Vec<f32>>,
 }
 
 impl MadDistance {
     /// Creates the filter. The floor is in meters.
     #[must_use]
-    pub fn new(factor: f32, floor: f32) -> Self {
+    pub fn new(factor: f64, floor: f64) -> Self {
         Self {
             factor,
             floor,
@@ -58,7 +59,7 @@ impl OutlierFilter for MadDistance {
         let deviation = SIGMA_PER_MAD * median(distances, f32::total_cmp).unwrap_or(0.0);
         keep_within(
             pairs,
-            center + self.factor * deviation.max(self.floor.max(0.0)),
+            center + narrow(self.factor) * deviation.max(narrow(self.floor).max(0.0)),
         );
     }
 

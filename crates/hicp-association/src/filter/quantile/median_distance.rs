@@ -6,6 +6,7 @@ use hicp_core::{Correspondences, Iteration};
 use crate::filter::max_distance::keep_within;
 use crate::filter::outlier_filter::OutlierFilter;
 use crate::filter::quantile::distances::collect_finite;
+use crate::length::narrow;
 
 /// Removes pairs further apart than `factor` times the median distance.
 ///
@@ -17,14 +18,14 @@ use crate::filter::quantile::distances::collect_finite;
 #[derive(Clone, Debug, PartialEq)]
 pub struct MedianDistance {
     /// Largest distance, divided by the median. NaN and negative values remove every pair.
-    pub factor: f32,
+    pub factor: f64,
     distances: Scratch<Vec<f32>>,
 }
 
 impl MedianDistance {
     /// Creates the filter.
     #[must_use]
-    pub fn new(factor: f32) -> Self {
+    pub fn new(factor: f64) -> Self {
         Self {
             factor,
             distances: Scratch::default(),
@@ -45,7 +46,7 @@ impl OutlierFilter for MedianDistance {
         collect_finite(pairs, distances);
         keep_within(
             pairs,
-            self.factor * median(distances, f32::total_cmp).unwrap_or(0.0),
+            narrow(self.factor) * median(distances, f32::total_cmp).unwrap_or(0.0),
         );
     }
 

@@ -17,14 +17,14 @@ pub struct Trimmed {
     /// The kept share: the expected overlap.
     ///
     /// 1 or more keeps all. 0, negative values and NaN remove every pair.
-    pub keep: f32,
+    pub keep: f64,
     distances: Scratch<Vec<f32>>,
 }
 
 impl Trimmed {
     /// Creates the filter.
     #[must_use]
-    pub fn new(keep: f32) -> Self {
+    pub fn new(keep: f64) -> Self {
         Self {
             keep,
             distances: Scratch::default(),

@@ -17,18 +17,18 @@ use crate::filter::quantile::distances::{collect_finite, share_of};
 #[derive(Clone, Debug, PartialEq)]
 pub struct VarTrimmed {
     /// Smallest share to consider, clamped to 0 … 1, and at least one pair. NaN counts as 0.
-    pub min_keep: f32,
+    pub min_keep: f64,
     /// Largest share to consider, clamped to `min_keep` … 1. NaN counts as 0.
-    pub max_keep: f32,
+    pub max_keep: f64,
     /// Exponent λ: a larger value keeps more pairs. NaN keeps the largest share.
-    pub lambda: f32,
+    pub lambda: f64,
     distances: Scratch<Vec<f32>>,
 }
 
 impl VarTrimmed {
     /// Creates the filter.
     #[must_use]
-    pub fn new(min_keep: f32, max_keep: f32, lambda: f32) -> Self {
+    pub fn new(min_keep: f64, max_keep: f64, lambda: f64) -> Self {
         Self {
             min_keep,
             max_keep,
@@ -53,14 +53,13 @@ impl OutlierFilter for VarTrimmed {
         let n = distances.len();
         let fewest = share_of(self.min_keep, n).max(1);
         let most = share_of(self.max_keep, n).max(fewest);
-        let lambda = f64::from(self.lambda);
         let mut sum = 0.0;
         let mut best = (f64::INFINITY, f32::NAN);
         for (kept, distance) in (1..).zip(distances.iter().take(most)) {
             sum += f64::from(*distance).powi(2);
             if kept >= fewest {
                 let fraction = kept as f64 / n as f64;
-                let rmsd = (sum / kept as f64).sqrt() * fraction.powf(-lambda);
+                let rmsd = (sum / kept as f64).sqrt() * fraction.powf(-self.lambda);
                 // Rounding must not separate equal values. A NaN is never better, but if all are
                 // NaN, the last one is used.
                 if rmsd <= best.0 * (1.0 + 1e-12) || rmsd.is_nan() {

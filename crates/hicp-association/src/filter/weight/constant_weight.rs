@@ -3,6 +3,7 @@
 use hicp_core::{Correspondences, Iteration};
 
 use crate::filter::outlier_filter::OutlierFilter;
+use crate::length::narrow;
 
 /// Multiplies every weight by a constant.
 ///
@@ -11,7 +12,7 @@ use crate::filter::outlier_filter::OutlierFilter;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantWeight {
     /// The factor. Negative values, NaN and infinity count as 0.
-    pub weight: f32,
+    pub weight: f64,
 }
 
 impl Default for ConstantWeight {
@@ -23,11 +24,8 @@ impl Default for ConstantWeight {
 
 impl OutlierFilter for ConstantWeight {
     fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
-        let weight = if self.weight.is_finite() {
-            self.weight.max(0.0)
-        } else {
-            0.0
-        };
+        let weight = narrow(self.weight).max(0.0);
+        let weight = if weight.is_finite() { weight } else { 0.0 };
         for pair in pairs.as_mut_slice() {
             pair.weight *= weight;
         }

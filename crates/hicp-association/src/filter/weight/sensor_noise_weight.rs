@@ -5,6 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 use hicp_core::{Correspondences, Iteration, Surfel};
 
 use crate::filter::outlier_filter::OutlierFilter;
+use crate::length::narrow;
 
 /// Multiplies weights by 1/σ²(z, θ) of the observed point, divided by the mean over all pairs.
 ///
@@ -30,14 +31,14 @@ pub struct SensorNoiseWeight {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorNoise {
     /// c₀, meters.
-    pub constant: f32,
+    pub constant: f64,
     /// c₁, meters per meter.
-    pub linear: f32,
+    pub linear: f64,
     /// c₂, meters per square meter.
-    pub quadratic: f32,
+    pub quadratic: f64,
     /// Coefficient t of the tilt term, for z in meters and θ in radians; 0 for no influence of the
     /// tilt.
-    pub tilt: f32,
+    pub tilt: f64,
 }
 
 /// Smallest standard deviation, meters.
@@ -79,14 +80,16 @@ impl SensorNoise {
     #[must_use]
     pub fn sigma(&self, observed: &Surfel) -> f32 {
         let z = observed.point.z;
-        let mut sigma = self.constant + z * (self.linear + z * self.quadratic);
-        if self.tilt != 0.0 {
+        let [constant, linear, quadratic, tilt] =
+            [self.constant, self.linear, self.quadratic, self.tilt].map(narrow);
+        let mut sigma = constant + z * (linear + z * quadratic);
+        if tilt != 0.0 {
             let n = &observed.normal;
             let term = |slope: f32| {
                 let angle = slope.abs().atan2(n.z.abs()).min(MAX_TILT);
                 angle / (FRAC_PI_2 - angle).powi(2)
             };
-            sigma += self.tilt * z.powf(1.5) * (term(n.x) + term(n.y));
+            sigma += tilt * z.powf(1.5) * (term(n.x) + term(n.y));
         }
         // In this order, `max` turns a NaN into the minimum.
         sigma.max(MIN_SIGMA)

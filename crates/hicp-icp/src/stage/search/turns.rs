@@ -19,7 +19,7 @@ use crate::stop::{Convergence, IterationLimit};
 /// Number of points that are registered with the surface.
 const POINTS: usize = 300;
 /// Largest distance of their pairs, as a share of the diameter.
-const NEAR: f32 = 0.05;
+const NEAR: f64 = 0.05;
 /// Largest distance of a surface of revolution from itself after a rotation, as a share of the
 /// diameter.
 const SMOOTH: f64 = 0.015;
