@@ -9,16 +9,13 @@ use crate::length::Length;
 ///
 /// It also removes pairs whose distance is not finite. Cost: O(pairs).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MaxDistance(Length);
+pub struct MaxDistance(
+    /// Largest distance τ_max. With NaN and negative values, every pair is removed.
+    pub Length,
+);
 
 impl MaxDistance {
-    /// Creates the filter with a limit of either kind. NaN or a negative limit removes every pair.
-    #[must_use]
-    pub fn new(limit: Length) -> Self {
-        Self(limit)
-    }
-
-    /// Creates the filter with a limit in meters. NaN or a negative limit removes every pair.
+    /// Creates the filter with a limit in meters.
     #[must_use]
     pub fn meters(limit: f64) -> Self {
         Self(Length::Meters(limit))

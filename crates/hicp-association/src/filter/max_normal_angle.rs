@@ -10,24 +10,24 @@ use crate::length::narrow;
 /// Cost: O(pairs).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaxNormalAngle {
-    min_cosine: f32,
+    /// Largest angle θ_max, degrees.
+    ///
+    /// 180 or more keeps every pair. NaN and negative values remove every pair.
+    pub degrees: f64,
 }
 
 impl MaxNormalAngle {
     /// Creates the filter with a limit in degrees.
-    ///
-    /// A limit of 180 or more keeps every pair. NaN or a negative limit removes every pair.
     #[must_use]
-    pub fn degrees(limit: f64) -> Self {
-        Self {
-            min_cosine: min_cosine(limit),
-        }
+    pub fn degrees(degrees: f64) -> Self {
+        Self { degrees }
     }
 }
 
 impl OutlierFilter for MaxNormalAngle {
     fn filter(&mut self, _iteration: &Iteration<'_>, pairs: &mut Correspondences) {
-        pairs.retain(|pair| pair.source.normal.dot(&pair.target.normal) >= self.min_cosine);
+        let min_cosine = min_cosine(self.degrees);
+        pairs.retain(|pair| pair.source.normal.dot(&pair.target.normal) >= min_cosine);
     }
 
     fn name(&self) -> &'static str {

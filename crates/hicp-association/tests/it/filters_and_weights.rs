@@ -51,7 +51,7 @@ fn indices(pairs: &[Pair]) -> Vec<u32> {
 /// Filters that depend on distances, with their defaults.
 fn distance_filters() -> Vec<Box<dyn OutlierFilter>> {
     vec![
-        Box::new(MaxDistance::new(Length::Meters(f64::INFINITY))),
+        Box::new(MaxDistance(Length::Meters(f64::INFINITY))),
         Box::new(MedianDistance::default()),
         Box::new(MadDistance::default()),
         Box::new(MadDistance::new(3.0, 0.0)),

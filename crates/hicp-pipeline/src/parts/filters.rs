@@ -14,7 +14,7 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_filter("max-distance", |p| {
         p.about = "Removes pairs farther apart than τ_max. Source: §III-A.1; Turk & Levoy 1994. \
             Cost: O(n).";
-        Ok(MaxDistance::new(length(p, "limit", 0.25, "τ_max")?))
+        Ok(MaxDistance(length(p, "limit", 0.25, "τ_max")?))
     });
     catalog.add_filter("max-normal-angle", |p| {
         p.about = "Removes pairs whose normals differ by more than θ_max. Source: §III-A.1; Pulli \
