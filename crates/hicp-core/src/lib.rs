@@ -57,12 +57,8 @@ pub use object::model::{Model, ModelConfig};
 pub use object::sampling::{MAX_SAMPLES, sample_colored_surface, sample_surface};
 pub use object::sides::{Side, Sides};
 pub use object::surface_color::{SurfaceColor, TexturedTriangle};
-pub use object::symmetry::{
-    CONTINUOUS_STEPS, MAX_SYMMETRY_MOTIONS, Symmetries, SymmetryAxis, SymmetryError,
-};
-pub use pose::rotation::{
-    PoseMatrixError, ROTATION_TOLERANCE, RotationError, pose_from_matrix, rotation_from_matrix,
-};
+pub use object::symmetry::{MAX_SYMMETRY_MOTIONS, Symmetries, SymmetryAxis, SymmetryError};
+pub use pose::rotation::{PoseMatrixError, RotationError, pose_from_matrix, rotation_from_matrix};
 pub use pose::rotation_grid::rotation_grid;
 pub use pose::{se3, so3};
 pub use problem::{Context, Iteration, Problem, Source, Target};

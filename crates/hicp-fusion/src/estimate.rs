@@ -10,7 +10,7 @@ use crate::information::{information, symmetrized};
 pub const MAX_TRANSLATION_METERS: f64 = 1e6;
 
 /// Largest accepted entry of a covariance, m² or rad².
-pub const MAX_VARIANCE: f64 = 1e60;
+const MAX_VARIANCE: f64 = 1e60;
 
 /// Share of the largest entry up to which asymmetry and negative eigenvalues count as rounding.
 const ROUNDING: f64 = 1e-9;
@@ -43,7 +43,7 @@ pub enum FusionError {
         /// Length of the quaternion.
         norm: f64,
     },
-    /// An entry of a covariance is not finite or beyond [`MAX_VARIANCE`].
+    /// An entry of a covariance is not finite or beyond ±10⁶⁰.
     #[error(
         "covariance entry [{row}][{column}] is {value}, expected a finite number within ±{:e}",
         MAX_VARIANCE
@@ -131,7 +131,7 @@ impl PoseEstimate {
     /// # Errors
     ///
     /// [`FusionError`] if the pose is not a rigid motion within ±[`MAX_TRANSLATION_METERS`], or if
-    /// the covariance is not symmetric, positive semidefinite and within [`MAX_VARIANCE`].
+    /// the covariance is not symmetric, positive semidefinite and within ±10⁶⁰.
     pub fn new(
         camera_from_object: Isometry3<f64>,
         covariance: Matrix6<f64>,

@@ -1,6 +1,6 @@
 //! Barfoot & Furgale's fusion of any number of pose estimates.
 
-use hicp_core::internal::small::{cholesky6, inverse_of, solve6};
+use hicp_core::internal::small::{blocks, cholesky6, inverse_of, solve6};
 use hicp_core::{Isometry3, Matrix3, Matrix6, Vector3, Vector6, se3};
 
 use crate::estimate::{FusionError, PoseEstimate};
@@ -216,7 +216,7 @@ impl Fusion {
             h12 += dt * right;
             h22 += bt * right + dt * (w12.transpose() * b + w22 * d);
         }
-        let mut hessian = se3::blocks(&h11, &h12, &h22);
+        let mut hessian = blocks(&h11, &h12, &h22);
         let mut below = hessian.fixed_view_mut::<3, 3>(3, 0);
         below.copy_from(&h12.transpose());
         Linearization {

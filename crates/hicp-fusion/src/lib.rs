@@ -45,7 +45,7 @@ mod tails;
 mod unit;
 
 pub use covariance::{CovarianceModel, InflatedCovariance, MVE_FLOOR, MveCovariance};
-pub use estimate::{FusionError, MAX_TRANSLATION_METERS, MAX_VARIANCE, PoseEstimate};
+pub use estimate::{FusionError, MAX_TRANSLATION_METERS, PoseEstimate};
 pub use fuser::*;
 pub use fusion::{Fusion, fuse};
 pub use hicp_core;

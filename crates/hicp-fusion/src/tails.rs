@@ -11,8 +11,9 @@
 /// ν/2. In closed form it is 1 − (1 − u)ᵇ (1 + b u + b (b + 1) u²/2).
 ///
 /// ```
-/// use hicp_fusion::{CHI_SQUARED_6_999, probability_within};
-/// assert!((probability_within(CHI_SQUARED_6_999, f64::INFINITY) - 0.999).abs() < 1e-5);
+/// use hicp_fusion::probability_within;
+/// // The 99.9 % quantile of χ²₆.
+/// assert!((probability_within(22.458, f64::INFINITY) - 0.999).abs() < 1e-5);
 /// // 90 % of Student's distribution with ν = 4 is within 24.06, six times the quantile of F(6, 4).
 /// assert!((probability_within(24.06, 4.0) - 0.9).abs() < 1e-4);
 /// ```

@@ -19,7 +19,8 @@ pub struct Alternative {
     pub gap: f64,
     /// The agreement of the colors at the returned pose minus that at this one, as correlations.
     ///
-    /// `None` if there are no colors, or none that tell poses apart.
+    /// From 0.15 on, colors tell the poses apart. `None` if there are no colors, or none that tell
+    /// poses apart.
     pub color_gap: Option<f64>,
     /// MSSD from the returned pose, meters.
     pub mssd_meters: f64,
@@ -31,13 +32,13 @@ impl Alternative {
     /// The gap in score within which two poses explain the image equally well.
     pub const AMBIGUOUS_GAP: f64 = 0.01;
     /// The gap in the agreement of colors from which on colors tell two poses apart.
-    pub const COLOR_GAP: f64 = 0.15;
+    const COLOR_GAP: f64 = 0.15;
 
     /// Returns how likely a pose is right, relative to one whose score is lower by `gap`.
     ///
     /// It is exp(−gap / [`Self::AMBIGUOUS_GAP`]), and 1 if the gap is negative.
     #[must_use]
-    pub fn likelihood_of(gap: f64) -> f64 {
+    pub(crate) fn likelihood_of(gap: f64) -> f64 {
         (-gap.max(0.0) / Self::AMBIGUOUS_GAP).exp()
     }
 

@@ -5,7 +5,7 @@ use thiserror::Error;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 /// Number of rotations into which BOP divides a continuous symmetry: ⌈π/0.01⌉.
-pub const CONTINUOUS_STEPS: usize = 315;
+const CONTINUOUS_STEPS: usize = 315;
 
 /// The largest number of motions that symmetries from a file may expand to.
 ///
@@ -160,9 +160,8 @@ impl Symmetries {
 
     /// Returns the symmetry motions as BOP expands them, the identity first.
     ///
-    /// Every continuous symmetry becomes [`CONTINUOUS_STEPS`] rotations, each composed with every
-    /// discrete symmetry (continuous ∘ discrete). Readers refuse symmetries of more than
-    /// [`MAX_SYMMETRY_MOTIONS`].
+    /// Every continuous symmetry becomes 315 rotations, each composed with every discrete symmetry
+    /// (continuous ∘ discrete). Readers refuse symmetries of more than [`MAX_SYMMETRY_MOTIONS`].
     ///
     /// # Panics
     ///

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, Translation3, UnitQuatern
 
 /// Largest deviation from orthogonality and from determinant 1 that counts as rounding: entries
 /// with three digits after the point deviate by at most 1.8·10⁻³.
-pub const ROTATION_TOLERANCE: f64 = 2e-3;
+const ROTATION_TOLERANCE: f64 = 2e-3;
 
 /// Returns the rotation nearest to a matrix that is a rotation up to rounding.
 ///
@@ -19,8 +19,8 @@ pub const ROTATION_TOLERANCE: f64 = 2e-3;
 ///
 /// # Errors
 ///
-/// [`RotationError`] if an entry is not finite or the matrix is further than [`ROTATION_TOLERANCE`]
-/// from a rotation.
+/// [`RotationError`] if an entry is not finite, or if the matrix deviates by more than 0.002 from
+/// orthogonality or from determinant 1.
 ///
 /// ```
 /// use hicp_core::{Matrix3, RotationError, rotation_from_matrix};

@@ -8,6 +8,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, Vector3, Vector6};
 
+use crate::internal::small::{blocks, join};
 use crate::pose::so3::{self, SERIES_ANGLE, hat};
 
 /// Returns exp(ξ^), the rigid motion of a twist ξ = [ρ; φ].
@@ -161,20 +162,4 @@ fn split(xi: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
         Vector3::new(xi[0], xi[1], xi[2]),
         Vector3::new(xi[3], xi[4], xi[5]),
     )
-}
-
-/// Returns the vector [ρ; φ].
-#[must_use]
-pub fn join(rho: &Vector3<f64>, phi: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(rho.x, rho.y, rho.z, phi.x, phi.y, phi.z)
-}
-
-/// Returns the matrix [a b; 0 d].
-#[must_use]
-pub fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
-    let mut matrix = Matrix6::zeros();
-    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
-    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(b);
-    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(d);
-    matrix
 }

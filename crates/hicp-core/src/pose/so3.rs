@@ -1,8 +1,7 @@
 //! The rotation group SO(3): exponential, logarithm and left Jacobian.
 //!
 //! A rotation vector φ is axis × angle, in radians. Closed forms are those of Barfoot & Furgale
-//! (T-RO 2014). Below [`SERIES_ANGLE`], where the closed coefficients cancel, a Taylor series
-//! replaces them.
+//! (T-RO 2014). Below 0.1 rad, where the closed coefficients cancel, a Taylor series replaces them.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -10,7 +9,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 ///
 /// In `f64`, the closed forms lose digits as 1/φ⁵. At 0.1 rad, series and closed form agree to
 /// about 1e-11.
-pub const SERIES_ANGLE: f64 = 0.1;
+pub(crate) const SERIES_ANGLE: f64 = 0.1;
 
 /// Returns φ^, the skew-symmetric matrix with φ^ x = φ × x.
 ///

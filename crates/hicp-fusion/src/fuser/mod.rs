@@ -13,7 +13,7 @@ pub(crate) mod symmetry_aware;
 pub use batch::BatchFuser;
 pub use config::FuserConfig;
 pub use fuser_trait::{Failure, Fuser, Update};
-pub use gate::{CHI_SQUARED_6_999, Gate, Gated};
+pub use gate::{Gate, Gated};
 pub use method::{BoxedFuser, FusionMethod, IntoFuser};
 pub use recursive::RecursiveFuser;
 pub use shared_error::SharedError;

@@ -3,8 +3,8 @@
 use crate::common::{Random, estimate, relative};
 use hicp_core::{Isometry3, Matrix6, Point3, Symmetries, Vector3, se3};
 use hicp_fusion::{
-    BatchFuser, CHI_SQUARED_6_999, CameraMotion, Failure, Fuser, FuserConfig, FusionError,
-    FusionMethod, Gate, Gated, PoseEstimate, SharedError, SymmetryAware, UnitCovariance, Update,
+    BatchFuser, CameraMotion, Failure, Fuser, FuserConfig, FusionError, FusionMethod, Gate, Gated,
+    PoseEstimate, SharedError, SymmetryAware, UnitCovariance, Update,
 };
 
 fn at(x: f64, mve: f64) -> PoseEstimate {
@@ -95,7 +95,6 @@ fn the_gate_passes_what_its_covariances_allow() {
         })
         .count();
     assert!((0..=14).contains(&rejected), "{rejected}");
-    assert!(rejected > 0 || CHI_SQUARED_6_999 > 22.0);
 }
 
 #[test]

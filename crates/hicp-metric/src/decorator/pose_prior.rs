@@ -1,5 +1,6 @@
 //! A Gaussian prior of the pose.
 
+use hicp_core::internal::small::blocks;
 use hicp_core::{Correspondences, Isometry3, Iteration, Matrix3, Matrix6, Vector6, se3, so3::hat};
 
 use crate::metric::error_metric::Step;
@@ -54,7 +55,7 @@ impl Prior {
                 // The displacement of the object's origin is ρ + φ × t.
                 let shift = -hat(&init.translation.vector);
                 let identity = Matrix3::identity();
-                let about_object = se3::blocks(&identity, &shift, &identity);
+                let about_object = blocks(&identity, &shift, &identity);
                 let [t, r] = [translation_meters, rotation_degrees.to_radians()]
                     .map(|sigma| sigma.powi(2).recip());
                 let information = Matrix6::from_diagonal(&Vector6::new(t, t, t, r, r, r));

@@ -1,7 +1,8 @@
 //! Normal equations with frozen components of the increment.
 
+use hicp_core::internal::small::blocks;
 use hicp_core::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
-use hicp_core::{se3, so3, so3::hat};
+use hicp_core::{so3, so3::hat};
 
 use crate::system::freedom::Freedom;
 use crate::system::normal_equations::NormalEquations;
@@ -47,7 +48,7 @@ impl NormalEquations {
         };
         let axes = freedom.axes.to_rotation_matrix().into_inner();
         let lever = hat(&(self.pivot - freedom.center)) * axes / -self.length;
-        let mut basis = se3::blocks(&axes, &lever, &axes);
+        let mut basis = blocks(&axes, &lever, &axes);
         for (component, mut column) in basis.column_iter_mut().enumerate() {
             if freedom.held[component] {
                 column.fill(0.0);

@@ -1,6 +1,7 @@
 //! The 6×6 normal equations of a rigid increment.
 
-use hicp_core::{Matrix3, Matrix6, Point3, Vector3, Vector6, se3, so3::hat};
+use hicp_core::internal::small::blocks;
+use hicp_core::{Matrix3, Matrix6, Point3, Vector3, Vector6, so3::hat};
 
 use crate::system::degeneracy::Degeneracy;
 use crate::system::freedom::Freedom;
@@ -170,7 +171,7 @@ impl NormalEquations {
         // L'/L.
         let shift = hat(&(other.pivot - self.pivot)) / -self.length;
         let scale = Matrix3::identity() * (other.length / self.length);
-        let change = se3::blocks(&Matrix3::identity(), &shift, &scale);
+        let change = blocks(&Matrix3::identity(), &shift, &scale);
         self.weight = None;
         let trace = self.damping_trace() + factor * other.damping_trace();
         if self.row_trace.is_some() || other.row_trace.is_some() {
@@ -215,7 +216,7 @@ impl NormalEquations {
     ///
     /// z is the scaled twist around the pivot, and ξ the plain one around the camera origin.
     pub(crate) fn camera_from_scaled(&self) -> Matrix6<f64> {
-        se3::blocks(
+        blocks(
             &Matrix3::identity(),
             &(hat(&self.pivot.coords) / self.length),
             &(Matrix3::identity() / self.length),
@@ -224,7 +225,7 @@ impl NormalEquations {
 
     /// Returns the inverse of [`NormalEquations::camera_from_scaled`].
     pub(crate) fn scaled_from_camera(&self) -> Matrix6<f64> {
-        se3::blocks(
+        blocks(
             &Matrix3::identity(),
             &-hat(&self.pivot.coords),
             &(Matrix3::identity() * self.length),

@@ -1,8 +1,8 @@
 //! The motion of an object: a filter that predicts its pose and knows how uncertain it is.
 
-use hicp_core::internal::small::{eigen6, inverse6};
+use hicp_core::internal::small::{eigen6, inverse6, join};
 use hicp_core::nalgebra::{Const, SymmetricEigen};
-use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, se3, so3};
+use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, so3};
 
 /// Largest speed (m/s and rad/s) and time constant (seconds).
 const MAX: f64 = 1e3;
@@ -207,11 +207,11 @@ pub(super) fn difference(
     center: &Point3<f64>,
 ) -> Vector6<f64> {
     let turn = so3::log(&(a.rotation * b.rotation.inverse()));
-    se3::join(&(a * center - b * center), &turn)
+    join(&(a * center - b * center), &turn)
 }
 
 fn squares([translation, rotation]: [f64; 2]) -> Vector6<f64> {
-    se3::join(
+    join(
         &Vector3::repeat(translation * translation),
         &Vector3::repeat(rotation * rotation),
     )
@@ -274,11 +274,10 @@ mod tests {
         let mut information = Matrix6::zeros();
         for (x, y) in [(-0.1, -0.1), (0.1, -0.1), (0.0, 0.1), (0.1, 0.1)] {
             let point = at.coords + Vector3::new(x, y, 0.0);
-            let row = se3::join(&Vector3::z(), &point.cross(&Vector3::z()));
+            let row = join(&Vector3::z(), &point.cross(&Vector3::z()));
             information += row * row.transpose();
         }
-        let displacement =
-            Matrix6::from_diagonal(&se3::join(&Vector3::repeat(1.0), &[0.1; 3].into()));
+        let displacement = Matrix6::from_diagonal(&join(&Vector3::repeat(1.0), &[0.1; 3].into()));
         let registered = Registered::new(&information, &at, &displacement);
         let covariance = registered.covariance(1e-6, [0.0; 2], [0.1, 1.0]);
         let pose = *motion.pose();

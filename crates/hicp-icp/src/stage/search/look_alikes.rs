@@ -101,8 +101,8 @@ pub(crate) fn nearest_to_initial(
 ///
 /// A pose looks like another one if the model nearly covers it, such as a mug that is rotated
 /// around its axis while its handle is hidden. At most 4 of them are counted, each by
-/// [`Alternative::likelihood_of`] its gap in score, if its MSSD from the pose is above a tenth of
-/// the diameter. Declared symmetries are no look-alikes.
+/// exp(−gap / 0.01) of its gap in score, if its MSSD from the pose is above a tenth of the
+/// diameter. Declared symmetries are no look-alikes.
 ///
 /// ```
 /// use hicp_icp::LookAlikeCount;
