@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use hicp_io::bop::{Detection, ResultRow};
+use hybrid_icp::checks::{warning_of_box, warnings};
 use hybrid_icp::core::{Isometry3, Model};
 use hybrid_icp::icp::{Alternative, Verdict};
-use hybrid_icp::{Refinement, Refiner, warning_of_box, warnings};
+use hybrid_icp::{Refinement, Refiner};
 
 use crate::bop_image::BopImage;
 use crate::fault::Fault;

@@ -1,10 +1,11 @@
 //! The results of refining an image, and their transfer to the rows of the file.
 
 use hicp_io::bop::ResultRow;
+use hybrid_icp::Warning;
+use hybrid_icp::checks::{warning_of_runner_up, warnings_of_result};
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::icp::Alternative;
 use hybrid_icp::score::Flatness;
-use hybrid_icp::{Warning, warning_of_runner_up, warnings_of_result};
 use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
@@ -33,7 +34,7 @@ pub struct RowResult {
 }
 
 impl RowResult {
-    /// Returns the reasons not to trust the pose ([`hybrid_icp::warnings_of_result`]).
+    /// Returns the reasons not to trust the pose ([`hybrid_icp::checks::warnings_of_result`]).
     ///
     /// Without an MVE, there are none.
     #[must_use]

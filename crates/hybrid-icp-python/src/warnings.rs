@@ -1,6 +1,6 @@
 //! Warnings about the inputs of a run, in the words of Python.
 
-use hybrid_icp::{Warning, warnings_of_image};
+use hybrid_icp::{Warning, checks::warnings_of_image};
 use pyo3::prelude::*;
 
 use crate::errors;

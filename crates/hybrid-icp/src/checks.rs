@@ -67,7 +67,10 @@ const FARTHEST_DEGREES: f64 = 70.0;
 /// A warning refuses nothing. Cost: O(pixels of the mask's box + vertices).
 ///
 /// ```
-/// use hybrid_icp::{core::*, score::Flatness, *};
+/// use hybrid_icp::core::{
+///     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, TriMesh,
+/// };
+/// use hybrid_icp::{Warning, warnings};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
 /// let model = Model::new(TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?);
@@ -163,7 +166,7 @@ pub fn warnings_of_image(
 /// inside the mask, both in meters. Returns [`Warning::BehindCamera`] or [`Warning::Depth`].
 ///
 /// ```
-/// use hybrid_icp::{Warning, warning_of_distance};
+/// use hybrid_icp::{Warning, checks::warning_of_distance};
 /// assert_eq!(warning_of_distance(0.5, Some(0.6)), None);
 /// assert!(matches!(warning_of_distance(-0.5, None), Some(Warning::BehindCamera { .. })));
 /// assert!(matches!(warning_of_distance(5.0, Some(0.6)), Some(Warning::Depth { .. })));
@@ -184,7 +187,8 @@ pub fn warning_of_distance(distance: f64, median_depth: Option<f64>) -> Option<W
 /// Returns the [`warnings`] about a model that need no image.
 ///
 /// ```
-/// use hybrid_icp::{core::*, score::Flatness, *};
+/// use hybrid_icp::core::{Model, Point3, TriMesh};
+/// use hybrid_icp::{Warning, checks::warnings_of_model};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// // A mesh of 80 mm that was read as meters.
 /// let corners = [[0., 0., 0.], [80., 0., 0.], [0., 80., 0.]].map(Point3::from);
@@ -218,7 +222,8 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
 /// the diameters that no mesh of that radius has.
 ///
 /// ```
-/// use hybrid_icp::{core::*, score::Flatness, *};
+/// use hybrid_icp::core::{Model, ModelConfig, Point3, TriMesh};
+/// use hybrid_icp::{Warning, checks::warning_of_diameter};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
 /// let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?;
@@ -248,7 +253,7 @@ pub fn warning_of_diameter(model: &Model) -> Option<Warning> {
 /// image in both orientations.
 ///
 /// ```
-/// use hybrid_icp::{core::*, score::Flatness, *};
+/// use hybrid_icp::{Warning, checks::warnings_of_result, score::Flatness};
 /// // A rough pose that became a good one.
 /// let at = |residual| Some(Flatness::new(residual, 0.0025, 0.009, 0.2));
 /// assert_eq!(warnings_of_result(0.6, 0.1, 0.97, at(0.002)), []);
@@ -344,7 +349,7 @@ fn warning_of_center(camera: &PinholeCamera) -> Option<Warning> {
 /// in pixels. A box of less than a pixel has none.
 ///
 /// ```
-/// use hybrid_icp::box_overlaps;
+/// use hybrid_icp::checks::box_overlaps;
 /// assert!(box_overlaps([-20.0, 470.0, 30.0, 30.0], (640, 480)));
 /// assert!(!box_overlaps([640.0, 10.0, 30.0, 30.0], (640, 480)));
 /// ```
@@ -362,7 +367,7 @@ pub fn box_overlaps([x, y, w, h]: [f64; 4], (width, height): (u32, u32)) -> bool
 /// the size of the image is width and height, in pixels. A tenth of the box may be outside.
 ///
 /// ```
-/// use hybrid_icp::{Warning, warning_of_box};
+/// use hybrid_icp::{Warning, checks::warning_of_box};
 /// assert_eq!(warning_of_box([300.0, 200.0, 90.0, 80.0], (640, 480)), None);
 /// let corners = warning_of_box([300.0, 200.0, 390.0, 280.0], (640, 480));
 /// assert!(matches!(corners, Some(Warning::Box { .. })));

@@ -75,7 +75,7 @@
 mod align;
 mod batch;
 mod calibration;
-mod checks;
+pub mod checks;
 mod diagnosis;
 mod mask_in_box;
 mod preset;
@@ -104,11 +104,7 @@ pub use align::{
 };
 pub use batch::refine_batch;
 pub use calibration::Calibration;
-pub use checks::{
-    ACCEPTED, EXPLAINS_NOTHING, box_overlaps, warning_of_box, warning_of_diameter,
-    warning_of_distance, warning_of_runner_up, warnings, warnings_of_image, warnings_of_model,
-    warnings_of_result,
-};
+pub use checks::{ACCEPTED, warnings};
 pub use diagnosis::{Diagnosis, Fault, Finding};
 pub use hicp_icp::BoxedStage;
 pub use mask_in_box::mask_in_box;

@@ -20,7 +20,7 @@ pub enum Warning {
         diameter: f64,
     },
     /// The diameter that the model was given differs from that of its mesh
-    /// ([`warning_of_diameter`](crate::warning_of_diameter)).
+    /// ([`warning_of_diameter`](crate::checks::warning_of_diameter)).
     #[error("the stated diameter is {}, but that of the mesh is {}", Meters(*stated), Meters(*measured))]
     StatedDiameter {
         /// The diameter that the model was made with.
@@ -50,7 +50,7 @@ pub enum Warning {
         /// The fault.
         fault: CenterFault,
     },
-    /// A box ends outside of the image ([`warning_of_box`](crate::warning_of_box)).
+    /// A box ends outside of the image ([`warning_of_box`](crate::checks::warning_of_box)).
     #[error(
         "the box ends at ({right}, {bottom}), outside of the {width}x{height} image: check that it is x, y, width, height, and not two corners"
     )]

@@ -6,6 +6,7 @@ use hicp_io::pose_from_bop;
 use hicp_sim::{Household, RelativeGaussian, rng};
 use hicp_tests::OBJECTS;
 use hicp_tests::starts::starts;
+use hybrid_icp::checks::{ACCEPTED, warning_of_diameter, warnings, warnings_of_result};
 use hybrid_icp::core::{
     CameraError, DepthImage, Isometry3, Mask, Matrix3, Model, ModelConfig, Observation,
     PinholeCamera, Point3, TriMesh,
@@ -14,10 +15,7 @@ use hybrid_icp::icp::Verdict;
 use hybrid_icp::raster::render_depth_image;
 use hybrid_icp::score::Flatness;
 use hybrid_icp::switch::PAPER_ALPHA;
-use hybrid_icp::{
-    ACCEPTED, Preset, Refinement, Refiner, Warning, warning_of_diameter, warnings,
-    warnings_of_result,
-};
+use hybrid_icp::{Preset, Refinement, Refiner, Warning};
 
 const BAD: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 

@@ -2,12 +2,13 @@
 
 use hicp_sim::{Household, rng};
 use hicp_tests::render;
+use hybrid_icp::checks::{ACCEPTED, warnings, warnings_of_model};
 use hybrid_icp::core::nalgebra::{Quaternion, UnitQuaternion};
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera, TriMesh,
 };
 use hybrid_icp::icp::Verdict;
-use hybrid_icp::{ACCEPTED, CenterFault, Preset, Refiner, Warning, warnings, warnings_of_model};
+use hybrid_icp::{CenterFault, Preset, Refiner, Warning};
 
 use crate::numbers::{camera, cuboid};
 

@@ -7,8 +7,8 @@ use clap::Args;
 use hicp_bop::{ModelFolder, Models, chain};
 use hicp_io::bop::Dataset;
 use hicp_io::{IoError, LengthUnit};
+use hybrid_icp::checks::{warning_of_diameter, warnings_of_model};
 use hybrid_icp::core::Model;
-use hybrid_icp::{warning_of_diameter, warnings_of_model};
 use rayon::prelude::*;
 
 use crate::bop::advice::is_about_diameter;

@@ -8,10 +8,11 @@ use clap::error::ErrorKind;
 use clap::{ArgGroup, Args};
 use hicp_io::bop::ModelInfo;
 use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
+use hybrid_icp::checks::{box_overlaps, warning_of_box, warning_of_diameter};
 use hybrid_icp::core::{
     ColorImage, DepthImage, Mask, Model, ModelConfig, Observation, PinholeCamera,
 };
-use hybrid_icp::{box_overlaps, mask_in_box, warning_of_box, warning_of_diameter};
+use hybrid_icp::mask_in_box;
 
 use super::colors;
 use crate::limits::limits;

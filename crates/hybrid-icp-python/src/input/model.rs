@@ -6,12 +6,12 @@ use std::sync::OnceLock;
 use hicp_bop::ModelFolder;
 use hicp_io::LengthUnit;
 use hicp_io::bop::Dataset;
+use hybrid_icp::checks::warnings_of_model;
 use hybrid_icp::core::{
     MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Model, ModelConfig, Point3, Symmetries, SymmetryAxis,
     TriMesh, Vector3,
 };
 use hybrid_icp::score::ModelPoints;
-use hybrid_icp::warnings_of_model;
 use numpy::PyArrayMethods;
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;

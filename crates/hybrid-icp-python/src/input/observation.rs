@@ -93,11 +93,11 @@ pub(crate) fn mask_in_box(
     let bbox = array::numbers::<f64>(bbox, &[Some(4)], "bbox", expected)?.0;
     let bbox @ [x, y, w, h] = [bbox[0], bbox[1], bbox[2], bbox[3]];
     let (width, height) = camera.size();
-    if !hybrid_icp::box_overlaps(bbox, (width, height)) {
+    if !hybrid_icp::checks::box_overlaps(bbox, (width, height)) {
         let found = format!("bbox is ({x}, {y}, {w}, {h}) in a {width}x{height} image");
         return Err(InputError::new_err(format!("{found}, expected {expected}")));
     }
-    if let Some(warning) = hybrid_icp::warning_of_box(bbox, camera.size()) {
+    if let Some(warning) = hybrid_icp::checks::warning_of_box(bbox, camera.size()) {
         errors::warn(py, &format!("bbox ({x}, {y}, {w}, {h}): {warning}"))?;
     }
     let mask = py.detach(|| hybrid_icp::mask_in_box(&image, &camera, bbox));

@@ -2,8 +2,9 @@
 
 use std::sync::Mutex;
 
+use hybrid_icp::checks::warning_of_distance;
 use hybrid_icp::core::Isometry3;
-use hybrid_icp::{TrackError, Tracker, TrackerConfig, warning_of_distance};
+use hybrid_icp::{TrackError, Tracker, TrackerConfig};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix, unexpected};

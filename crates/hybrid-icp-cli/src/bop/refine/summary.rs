@@ -5,8 +5,9 @@ use std::path::Path;
 
 use anyhow::bail;
 use hicp_bop::{Fault, FaultKind, FrameResult, MaskSource, Models, RowResult, RowStatus};
+use hybrid_icp::Warning;
+use hybrid_icp::checks::{ACCEPTED, EXPLAINS_NOTHING};
 use hybrid_icp::switch::PAPER_ALPHA;
-use hybrid_icp::{ACCEPTED, EXPLAINS_NOTHING, Warning};
 
 use super::job::RefineJob;
 use crate::bop::statistics::median;
