@@ -24,7 +24,7 @@ use crate::search::point_tree::PointTree;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reciprocal<A> {
     /// The association whose pairs are filtered.
-    pub inner: A,
+    pub association: A,
     scratch: Scratch<Moved>,
 }
 
@@ -37,9 +37,9 @@ struct Moved {
 impl<A> Reciprocal<A> {
     /// Creates the association.
     #[must_use]
-    pub fn new(inner: A) -> Self {
+    pub fn new(association: A) -> Self {
         Self {
-            inner,
+            association,
             scratch: Scratch::default(),
         }
     }
@@ -54,7 +54,7 @@ impl<A: DataAssociation> DataAssociation for Reciprocal<A> {
         pairs: &mut Correspondences,
     ) {
         let earlier = pairs.len();
-        self.inner
+        self.association
             .associate(context, source, camera_from_object, pairs);
         let Moved { points, tree } = &mut self.scratch.0;
         let mover = RigidTransform::new(camera_from_object);
@@ -83,6 +83,6 @@ impl<A: DataAssociation> DataAssociation for Reciprocal<A> {
     }
 
     fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
-        self.inner.unsupported(problem)
+        self.association.unsupported(problem)
     }
 }

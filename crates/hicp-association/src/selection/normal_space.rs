@@ -23,7 +23,7 @@ use crate::selection::point_selection::PointSelection;
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalSpace<P> {
     /// The selection to select from.
-    pub inner: P,
+    pub selection: P,
     /// Number of points to keep.
     pub count: usize,
     /// Cells along an edge of the cube, for 6·resolution² buckets.
@@ -47,9 +47,9 @@ const MAX_RESOLUTION: usize = 64;
 impl<P> NormalSpace<P> {
     /// Creates the selection.
     #[must_use]
-    pub fn new(inner: P, count: usize, resolution: usize) -> Self {
+    pub fn new(selection: P, count: usize, resolution: usize) -> Self {
         Self {
-            inner,
+            selection,
             count,
             resolution,
             scratch: Scratch::default(),
@@ -71,7 +71,7 @@ impl<P: PointSelection> PointSelection for NormalSpace<P> {
         camera_from_object: &Isometry3<f64>,
         source: &mut Vec<Surfel>,
     ) {
-        self.inner.select(context, camera_from_object, source);
+        self.selection.select(context, camera_from_object, source);
         if source.len() <= self.count {
             return;
         }
@@ -98,7 +98,7 @@ impl<P: PointSelection> PointSelection for NormalSpace<P> {
     }
 
     fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
-        self.inner.unsupported(problem)
+        self.selection.unsupported(problem)
     }
 }
 

@@ -15,7 +15,7 @@ use crate::selection::point_selection::PointSelection;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RandomSample<P> {
     /// The selection to select from.
-    pub inner: P,
+    pub selection: P,
     /// Number of points to keep.
     pub count: usize,
     /// Seed of the draw, any value.
@@ -26,7 +26,7 @@ impl Default for RandomSample<AllSamples> {
     /// 500 of the model's samples.
     fn default() -> Self {
         Self {
-            inner: AllSamples,
+            selection: AllSamples,
             count: 500,
             seed: 0,
         }
@@ -40,7 +40,7 @@ impl<P: PointSelection> PointSelection for RandomSample<P> {
         camera_from_object: &Isometry3<f64>,
         source: &mut Vec<Surfel>,
     ) {
-        self.inner.select(context, camera_from_object, source);
+        self.selection.select(context, camera_from_object, source);
         let mut random = SplitMix64(self.seed);
         let (mut left, mut wanted) = (source.len() as u64, self.count as u64);
         source.retain(|_| {
@@ -59,7 +59,7 @@ impl<P: PointSelection> PointSelection for RandomSample<P> {
     }
 
     fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
-        self.inner.unsupported(problem)
+        self.selection.unsupported(problem)
     }
 }
 

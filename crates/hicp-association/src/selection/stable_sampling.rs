@@ -27,7 +27,7 @@ use crate::selection::point_selection::PointSelection;
 #[derive(Clone, Debug, PartialEq)]
 pub struct StableSampling<P> {
     /// The selection to select from.
-    pub inner: P,
+    pub selection: P,
     /// Number of points to keep.
     pub count: usize,
     scratch: Scratch<Buffers>,
@@ -45,9 +45,9 @@ struct Buffers {
 impl<P> StableSampling<P> {
     /// Creates the selection.
     #[must_use]
-    pub fn new(inner: P, count: usize) -> Self {
+    pub fn new(selection: P, count: usize) -> Self {
         Self {
-            inner,
+            selection,
             count,
             scratch: Scratch::default(),
         }
@@ -68,7 +68,7 @@ impl<P: PointSelection> PointSelection for StableSampling<P> {
         camera_from_object: &Isometry3<f64>,
         source: &mut Vec<Surfel>,
     ) {
-        self.inner.select(context, camera_from_object, source);
+        self.selection.select(context, camera_from_object, source);
         // Points that are not finite constrain nothing, and an eigendecomposition must not receive
         // them.
         source.retain(is_finite);
@@ -85,7 +85,7 @@ impl<P: PointSelection> PointSelection for StableSampling<P> {
     }
 
     fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
-        self.inner.unsupported(problem)
+        self.selection.unsupported(problem)
     }
 }
 

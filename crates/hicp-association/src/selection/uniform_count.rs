@@ -15,7 +15,7 @@ use crate::selection::point_selection::PointSelection;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UniformCount<P> {
     /// The selection to select from.
-    pub inner: P,
+    pub selection: P,
     /// Number of points to keep.
     pub count: usize,
 }
@@ -24,7 +24,7 @@ impl Default for UniformCount<AllSamples> {
     /// 500 of the model's samples.
     fn default() -> Self {
         Self {
-            inner: AllSamples,
+            selection: AllSamples,
             count: 500,
         }
     }
@@ -37,7 +37,7 @@ impl<P: PointSelection> PointSelection for UniformCount<P> {
         camera_from_object: &Isometry3<f64>,
         source: &mut Vec<Surfel>,
     ) {
-        self.inner.select(context, camera_from_object, source);
+        self.selection.select(context, camera_from_object, source);
         let (count, length) = (self.count, source.len());
         if count < length {
             keep_positions(source, (0..count).map(|i| spread(i, count, length)));
@@ -49,6 +49,6 @@ impl<P: PointSelection> PointSelection for UniformCount<P> {
     }
 
     fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
-        self.inner.unsupported(problem)
+        self.selection.unsupported(problem)
     }
 }

@@ -20,7 +20,7 @@ use crate::selection::point_selection::PointSelection;
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelGrid<P> {
     /// The selection to select from.
-    pub inner: P,
+    pub selection: P,
     /// Edge of a cell.
     pub cell: Length,
     scratch: Scratch<Vec<Entry>>,
@@ -37,9 +37,9 @@ struct Entry {
 impl<P> VoxelGrid<P> {
     /// Creates the selection.
     #[must_use]
-    pub fn new(inner: P, cell: Length) -> Self {
+    pub fn new(selection: P, cell: Length) -> Self {
         Self {
-            inner,
+            selection,
             cell,
             scratch: Scratch::default(),
         }
@@ -60,7 +60,7 @@ impl<P: PointSelection> PointSelection for VoxelGrid<P> {
         camera_from_object: &Isometry3<f64>,
         source: &mut Vec<Surfel>,
     ) {
-        self.inner.select(context, camera_from_object, source);
+        self.selection.select(context, camera_from_object, source);
         let edge = self.cell.meters(&context.problem);
         if edge.is_nan() || edge <= 0.0 {
             return;
@@ -94,6 +94,6 @@ impl<P: PointSelection> PointSelection for VoxelGrid<P> {
     }
 
     fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
-        self.inner.unsupported(problem)
+        self.selection.unsupported(problem)
     }
 }

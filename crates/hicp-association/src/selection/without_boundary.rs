@@ -24,7 +24,7 @@ use crate::selection::visible_surface::VisibleSurface;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WithoutBoundary<P> {
     /// The selection to select from.
-    pub inner: P,
+    pub selection: P,
     /// Width of the boundary, pixels. Values above 64 count as 64.
     pub width: u32,
     /// Largest tilt of a surface against the image plane, degrees. A steeper step is a depth step.
@@ -37,7 +37,7 @@ impl Default for WithoutBoundary<VisibleSurface> {
     /// The visible surface without one pixel along the silhouette and along steps steeper than 85°.
     fn default() -> Self {
         Self {
-            inner: VisibleSurface::default(),
+            selection: VisibleSurface::default(),
             width: 1,
             max_tilt_degrees: 85.0,
         }
@@ -51,7 +51,7 @@ impl<P: PointSelection> PointSelection for WithoutBoundary<P> {
         camera_from_object: &Isometry3<f64>,
         source: &mut Vec<Surfel>,
     ) {
-        self.inner.select(context, camera_from_object, source);
+        self.selection.select(context, camera_from_object, source);
         let problem = context.problem;
         let (Some(observation), Some(view)) =
             (problem.observation(), context.view(camera_from_object))

@@ -56,14 +56,14 @@ fn impossible_poses_select_nothing_and_counts_may_be_zero() {
         let fixed = Fixed(Random::new(1).surfels(points, 0.1));
         for count in [0, 1, 5] {
             let expected = points.min(count);
-            let inner = fixed.clone();
+            let selection = fixed.clone();
             assert_eq!(
-                select_fixed(&mut UniformCount { inner, count }).len(),
+                select_fixed(&mut UniformCount { selection, count }).len(),
                 expected
             );
-            let inner = fixed.clone();
+            let selection = fixed.clone();
             let mut random = RandomSample {
-                inner,
+                selection,
                 count,
                 seed: 9,
             };
@@ -95,34 +95,34 @@ fn points_that_are_not_finite_do_not_panic() {
 
 #[test]
 fn uniform_count_is_evenly_spaced() {
-    let inner = Fixed(Random::new(3).surfels(10, 0.1));
+    let fixed = Fixed(Random::new(3).surfels(10, 0.1));
     let mut selection = UniformCount {
-        inner: inner.clone(),
+        selection: fixed.clone(),
         count: 4,
     };
     let chosen = select_fixed(&mut selection);
     // ⌊(i + ½)·10/4⌋
-    assert_eq!(positions(&inner.0, &chosen), [1, 3, 6, 8]);
+    assert_eq!(positions(&fixed.0, &chosen), [1, 3, 6, 8]);
     for count in [10, 11, usize::MAX] {
         selection.count = count;
-        assert_eq!(select_fixed(&mut selection), inner.0);
+        assert_eq!(select_fixed(&mut selection), fixed.0);
     }
 }
 
 #[test]
 fn random_samples_are_fair_and_follow_the_seed() {
-    let inner = Fixed(Random::new(4).surfels(12, 0.1));
+    let fixed = Fixed(Random::new(4).surfels(12, 0.1));
     let mut drawn = [0_u32; 12];
     let mut pairs_drawn = 0;
     for seed in 0..2000 {
         let mut selection = RandomSample {
-            inner: inner.clone(),
+            selection: fixed.clone(),
             count: 3,
             seed,
         };
         let chosen = select_fixed(&mut selection);
         assert_eq!(chosen, select_fixed(&mut selection.clone()));
-        let chosen = positions(&inner.0, &chosen);
+        let chosen = positions(&fixed.0, &chosen);
         assert_eq!(chosen.len(), 3);
         for position in &chosen {
             drawn[*position] += 1;
@@ -276,7 +276,7 @@ fn stable_sampling_finds_the_groove_of_a_plate() {
     };
     let stable = select_fixed(&mut StableSampling::new(Fixed(surfels.clone()), 100));
     let uniform = select_fixed(&mut UniformCount {
-        inner: Fixed(surfels),
+        selection: Fixed(surfels),
         count: 100,
     });
     let (stable, uniform) = (condition(&stable), condition(&uniform));
@@ -311,9 +311,8 @@ fn without_boundary_equals_its_definition() {
         {
             let slope = f64::to_radians(max_tilt_degrees).tan();
             let max_step = (slope / focal) as f32;
-            let inner = VisibleSurface::with_stride(stride);
             let mut selection = WithoutBoundary {
-                inner,
+                selection: VisibleSurface::with_stride(stride),
                 width,
                 max_tilt_degrees,
             };

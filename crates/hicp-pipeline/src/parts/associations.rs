@@ -59,9 +59,9 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_association("reciprocal", |p| {
         p.about = "Keeps the pairs of another association in which each is the other's closest. \
             Source: Pajdla & Van Gool 1995. Cost: that association, and O(n log n).";
-        let inner =
+        let association =
             p.part::<BoxedAssociation>("association", "nearest-neighbor", "to choose from")?;
-        Ok(Reciprocal::new(inner))
+        Ok(Reciprocal::new(association))
     });
     catalog.add_association("projective-search", |p| {
         p.about = "Pairs a point with the closest observed point in a window around its \

@@ -47,7 +47,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         p.about = "Keeps the points of another selection that are not rendered at a silhouette or \
             a depth step. Source: Turk & Levoy 1994. Cost: a render, shared with the score.";
         Ok(WithoutBoundary {
-            inner: inner(p, "visible-surface")?,
+            selection: selection(p, "visible-surface")?,
             width: p.count("width", 0, 1, "pixels from the boundary")?,
             max_tilt_degrees: p.number("max_tilt_degrees", TILT, 85.0, EDGE)?,
         })
@@ -55,7 +55,7 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_selection("uniform-count", |p| {
         p.about = "Keeps evenly spaced points of another selection. Cost: O(n).";
         Ok(UniformCount {
-            inner: inner(p, "all-samples")?,
+            selection: selection(p, "all-samples")?,
             count: count(p)?,
         })
     });
@@ -63,36 +63,39 @@ pub(super) fn add(catalog: &mut Catalog) {
         p.about = "Keeps random points of another selection, the same for a seed. Source: Masuda \
             1996. Cost: O(n).";
         Ok(RandomSample {
-            inner: inner(p, "all-samples")?,
+            selection: selection(p, "all-samples")?,
             count: count(p)?,
             seed: p.count("seed", 0, 0, "seed of the draw")?,
         })
     });
     catalog.add_selection("voxel-grid", |p| {
         p.about = "Keeps one point of another selection per cell of a grid. Cost: O(n log n).";
-        let inner = inner(p, "all-samples")?;
+        let selection = selection(p, "all-samples")?;
         Ok(VoxelGrid::new(
-            inner,
+            selection,
             length(p, "cell", 0.05, "edge of a cell")?,
         ))
     });
     catalog.add_selection("normal-space", |p| {
         p.about = "Keeps points of another selection whose normals are spread evenly. \
             Source: Rusinkiewicz & Levoy 2001. Cost: O(n).";
-        let (inner, count) = (inner(p, "all-samples")?, count(p)?);
+        let (selection, count) = (selection(p, "all-samples")?, count(p)?);
         let resolution = p.count("resolution", 1, 4, "cells per edge of a cube")?;
-        Ok(NormalSpace::new(inner, count, resolution))
+        Ok(NormalSpace::new(selection, count, resolution))
     });
     catalog.add_selection("stable-sampling", |p| {
         p.about = "Keeps points of another selection that constrain all six directions alike. \
             Source: Gelfand et al. 2003. Cost: O(n log n).";
-        Ok(StableSampling::new(inner(p, "all-samples")?, count(p)?))
+        Ok(StableSampling::new(selection(p, "all-samples")?, count(p)?))
     });
 }
 
 const KEPT: &str = "points to keep, about";
 
-fn inner(p: &mut Parameters<'_>, default: &'static str) -> Result<BoxedSelection, PipelineError> {
+fn selection(
+    p: &mut Parameters<'_>,
+    default: &'static str,
+) -> Result<BoxedSelection, PipelineError> {
     p.part("selection", default, "the selection to choose from")
 }
 

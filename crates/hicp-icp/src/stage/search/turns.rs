@@ -78,7 +78,7 @@ impl Turns {
         let problem = Problem::new(&cloud, &cloud);
         let mut register = Icp {
             selection: UniformCount {
-                inner: AllSamples,
+                selection: AllSamples,
                 count: POINTS,
             },
             association: NearestNeighbor::default(),
