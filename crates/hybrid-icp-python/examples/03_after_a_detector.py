@@ -35,7 +35,7 @@ def from_trimesh() -> Model:
     import trimesh
 
     mesh = trimesh.Trimesh(*bracket())
-    return Model(mesh.vertices, mesh.faces, unit="mm")
+    return Model.from_trimesh(mesh, unit="mm")
 
 
 def from_open3d() -> tuple[Model, Camera]:
@@ -47,7 +47,7 @@ def from_open3d() -> tuple[Model, Camera]:
         open3d.utility.Vector3iVector(faces.astype(np.int32)),
     )
     intrinsic = open3d.camera.PinholeCameraIntrinsic(640, 480, 600, 600, 319.5, 239.5)
-    model = Model(np.asarray(mesh.vertices), np.asarray(mesh.triangles), unit="mm")
+    model = Model.from_open3d(mesh, unit="mm")
     return model, Camera.from_K(intrinsic.intrinsic_matrix, (intrinsic.width, intrinsic.height))
 
 
@@ -63,7 +63,6 @@ def main() -> None:
     except (ImportError, OSError) as error:
         print(f"skipped: {error}")
     for name, model, camera in tried:
-        # An Open3D depth image is np.asarray(image), uint16, with scale=0.001.
         found = refine(model, camera, frame.depth)
         print(f"{name}: {model}, ADI {adi(found, frame.true, model) * 1000:.2f} mm")
 

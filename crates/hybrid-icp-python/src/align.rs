@@ -26,7 +26,8 @@ use crate::results;
 /// Parameters
 /// ----------
 /// source, target : array_like, shape (N, 3), float32
-///     Points, meters.
+///     Points, meters. A point cloud of Open3D, or the pair that `read_cloud` returns, is accepted
+///     with its normals.
 /// T_ts : array_like, shape (4, 4), optional
 ///     The rough pose, target from source, meters. The default is the identity. A translation
 ///     above 100 m is probably in millimeters, and causes a warning.
@@ -176,6 +177,26 @@ impl Observer for Signals {
     }
 }
 
+/// Returns the points of a cloud, and its normals if it has some: of one of Open3D, or of the pair
+/// that `read_cloud` returns. Anything else is points.
+fn parts<'py>(
+    cloud: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyAny>, Option<Bound<'py, PyAny>>)> {
+    let is_matrix = |value: &Bound<'_, PyAny>| value.len().is_ok_and(|rows| rows > 3);
+    if let Ok((points, normals)) = cloud.extract::<(Bound<'_, PyAny>, Option<Bound<'_, PyAny>>)>()
+        && (normals.is_none() || is_matrix(&points))
+    {
+        return Ok((points, normals));
+    }
+    if let (Some(points), Some(normals)) =
+        (cloud.getattr_opt("points")?, cloud.getattr_opt("normals")?)
+    {
+        let has_normals = normals.len()? > 0;
+        return Ok((points, has_normals.then_some(normals)));
+    }
+    Ok((cloud.clone(), None))
+}
+
 /// The arrays of a cloud.
 struct Points {
     points: Vec<Point3<f32>>,
@@ -190,11 +211,13 @@ impl Points {
     ) -> PyResult<Self> {
         // A zero normal becomes NaN, and its point is skipped.
         let unit = |n: Point3<f32>| UnitVector3::new_normalize(n.coords);
+        let (points, own) = parts(points)?;
         let normals = normals
+            .or(own.as_ref())
             .map(|array| array::triples(array, &format!("{name}_normals")))
             .transpose()?;
         Ok(Self {
-            points: array::triples(points, name)?,
+            points: array::triples(&points, name)?,
             normals: normals.map(|normals| normals.into_iter().map(unit).collect()),
         })
     }

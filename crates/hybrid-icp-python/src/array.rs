@@ -7,7 +7,7 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyMemoryView, PyString};
 
 use crate::errors::InputError;
 
@@ -30,8 +30,10 @@ pub(crate) fn kind(value: &Bound<'_, PyAny>) -> String {
     } else if value.is_none() {
         "None".to_owned()
     } else {
-        let name = value.get_type().name();
-        name.map_or_else(|_| "an object".to_owned(), |name| format!("a {name}"))
+        let name = value.get_type().name().map(|name| name.to_string());
+        let name = name.unwrap_or_else(|_| "object".to_owned());
+        let vowel = name.starts_with(['A', 'E', 'I', 'O', 'U', 'a', 'e', 'i', 'o', 'u']);
+        format!("{} {name}", if vowel { "an" } else { "a" })
     }
 }
 
@@ -91,7 +93,13 @@ pub(crate) fn as_array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<B
         }
         return Ok(value.clone());
     }
-    if !value.hasattr("__array__")? && !value.hasattr("__array_interface__")? {
+    // Images of Open3D have neither, but their memory as a buffer of two or three dimensions.
+    let is_image = || {
+        let buffer = PyMemoryView::from(value)?;
+        buffer.getattr("ndim")?.extract::<usize>()
+    };
+    let is_array = value.hasattr("__array__")? || value.hasattr("__array_interface__")?;
+    if !is_array && !is_image().is_ok_and(|dimensions| dimensions > 1) {
         return Ok(value.clone());
     }
     let numpy = value.py().import("numpy")?;
@@ -262,8 +270,13 @@ fn rigid(numbers: &[f64], name: &str) -> PyResult<Motion> {
     for (column, expected) in [0.0, 0.0, 0.0, 1.0].into_iter().enumerate() {
         let found = matrix[12 + column];
         if found.is_nan() || (found - expected).abs() > 1e-9 {
+            let transposed = [3, 7, 11, 15].map(|entry| matrix[entry]) == [0.0, 0.0, 0.0, 1.0];
+            let advice = match transposed {
+                true => format!(", and so is its last column: it may be transposed, pass {name}.T"),
+                false => String::new(),
+            };
             return Err(InputError::new_err(format!(
-                "{name}[3, {column}] is {found}, expected {expected}: the last row of a pose is 0 0 0 1"
+                "{name}[3, {column}] is {found}, expected {expected}: the last row of a pose is 0 0 0 1{advice}"
             )));
         }
     }

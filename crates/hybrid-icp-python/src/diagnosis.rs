@@ -7,6 +7,7 @@ use crate::array;
 use crate::input::model::PyModel;
 use crate::input::observation::PyObservation;
 use crate::results::{self, Record};
+use crate::warnings;
 
 /// Names what is wrong with the inputs of `Pipeline.refine`, and the fix.
 ///
@@ -37,6 +38,11 @@ use crate::results::{self, Record};
 /// InputError
 ///     If the pose is not a rigid motion.
 ///
+/// Warns
+/// -----
+/// InputWarning
+///     If no fault is found, but the inputs do not fit together (`Pipeline.refine`).
+///
 /// Examples
 /// --------
 /// A plate is 0.5 m in front of the camera, but its depth was read at ten times its scale:
@@ -64,5 +70,9 @@ pub(crate) fn diagnose<'py>(
     let init = array::motion_of_cloud(T_co, "T_co")?.isometry;
     let (object, image) = (&model.get().model, &observation.get().observation);
     let diagnosis = py.detach(|| Diagnosis::of(object, image, &init));
+    if diagnosis.findings.is_empty() {
+        let distance = (init * object.center()).z;
+        warnings::about_inputs(py, model.get(), observation.get(), &[distance], None)?;
+    }
     results::diagnosis(py, &diagnosis)
 }

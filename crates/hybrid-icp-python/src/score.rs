@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
 use crate::errors;
+use crate::errors::InputError;
 use crate::input::camera::PyCamera;
 use crate::input::depth;
 use crate::input::model::PyModel;
@@ -53,9 +54,9 @@ pub(crate) fn render_depth(
 ///     Camera from object, meters.
 /// occlusion_tolerance : float or None, optional
 ///     Rendered pixels outside the mask do not count if the measured surface hides them by more
-///     than this distance, meters. With a negative value, the measured surface can also be that
-///     far behind, for masks that miss a part of the object. `None` is the definition of the
-///     paper: every rendered pixel counts.
+///     than this distance, meters, 0.015 if not given. With a negative value, the measured surface
+///     can also be that far behind, for masks that miss a part of the object. `None` is the
+///     definition of the paper: every rendered pixel counts.
 /// imperfect_mask : bool, optional
 ///     Expects the mask of a detector: too large, too small, soft, or a box. `occlusion_tolerance`
 ///     then has no effect.
@@ -77,8 +78,11 @@ pub(crate) fn mve(
 ) -> PyResult<f64> {
     let pose = array::motion(T_co, "T_co")?.isometry;
     let (model, observation) = (&model.get().model, &observation.get().observation);
+    let tolerance = occlusion_tolerance
+        .map(|length| tolerance("occlusion_tolerance", length))
+        .transpose()?;
     let mut score = MeanVsd {
-        occlusion: occlusion_tolerance.map_or(Occlusion::Counted, Occlusion::from_tolerance),
+        occlusion: tolerance.map_or(Occlusion::Counted, Occlusion::from_tolerance),
         mask: match imperfect_mask {
             true => MaskTrust::Imperfect,
             false => MaskTrust::Exact,
@@ -91,6 +95,15 @@ pub(crate) fn mve(
     }))
 }
 
+/// Returns a tolerance in meters, or an error if it is probably in millimeters.
+fn tolerance(name: &str, meters: f64) -> PyResult<f64> {
+    if meters.abs() < 1.0 {
+        return Ok(meters);
+    }
+    let text = format!("{name} is {meters}, expected meters between -1 and 1, such as 0.015");
+    Err(InputError::new_err(text))
+}
+
 /// Computes the visible surface discrepancy (VSD) of BOP'19 between an estimated and a true pose.
 ///
 /// Parameters
@@ -101,7 +114,7 @@ pub(crate) fn mve(
 /// T_est, T_gt : array_like, shape (4, 4)
 ///     The estimated and the true pose, camera from object, meters.
 /// delta : float, optional
-///     Visibility tolerance, meters.
+///     Visibility tolerance, meters, 0.015 if not given.
 ///
 /// Returns
 /// -------
@@ -119,6 +132,7 @@ pub(crate) fn vsd<'py>(
     delta: f64,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (estimate, truth) = poses(T_est, T_gt)?;
+    let delta = tolerance("delta", delta)?;
     let (model, observation) = (&model.get().model, &observation.get().observation);
     let camera = observation.camera();
     let errors = py.detach(|| {

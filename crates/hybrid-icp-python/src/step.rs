@@ -30,7 +30,8 @@ use crate::errors::InputError;
 /// Raises
 /// ------
 /// InputError
-///     If the pairs do not determine a step.
+///     If there are fewer than three pairs, or numbers that are not finite. Of the steps that fit
+///     pairs on a line equally well, the one with the smallest rotation is returned.
 ///
 /// Examples
 /// --------
@@ -72,7 +73,8 @@ pub(crate) fn point_to_point_step(
 /// Raises
 /// ------
 /// InputError
-///     If the pairs do not determine a step.
+///     If there are fewer than six pairs, or numbers that are not finite. Directions that the
+///     normals do not determine are damped, so they hardly move.
 #[pyfunction]
 pub(crate) fn point_to_plane_step(
     sources: &Bound<'_, PyAny>,

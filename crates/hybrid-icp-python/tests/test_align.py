@@ -3,6 +3,7 @@
 import contextlib
 import signal
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +29,21 @@ def test_a_known_transform_is_recovered(method):
     assert result.covariance.shape == (6, 6) and "estimated from 20" in result.warnings[0]
     moved = hi.align(source + 5.0, target, pose([0, 0, 0], [-5.0, -5.0, -5.0]), method=method)
     assert np.abs(target[0] - (moved.T_ts @ [*(source[0] + 5.0), 1])[:3]).max() < 1e-4
+
+
+def test_clouds_of_open3d_and_of_files_are_read_with_their_normals(tmp_path):
+    points = surface()
+    normals = np.tile([0.0, 0.0, -1.0], (len(points), 1))
+    expected = hi.align(points, points, source_normals=normals, target_normals=normals)
+    np.save(tmp_path / "cloud.npy", np.hstack([points, normals]).astype(np.float32))
+    for cloud in (SimpleNamespace(points=points, normals=normals), (points, normals)):
+        found = hi.align(cloud, cloud)
+        assert np.array_equal(found.T_ts, expected.T_ts) and found.warnings == expected.warnings
+    bare = SimpleNamespace(points=points, normals=[])
+    assert "estimated from 20" in hi.align(bare, (points, None)).warnings[0]
+    assert hi.align(*[hi.read_cloud(tmp_path / "cloud.npy")] * 2).fitness == 1.0
+    two = ((0.1, 0.2, 0.3), (0.2, 0.1, 0.4))
+    assert hi.align(two, two, method="point-to-point").T_ts.shape == (4, 4)
 
 
 def test_hostile_points_keep_the_pose():

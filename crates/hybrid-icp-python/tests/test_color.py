@@ -3,6 +3,7 @@
 import pickle
 import struct
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -131,6 +132,24 @@ def test_color_images_of_open3d_are_read():
     color = Array(PICTURE)
     observation = hi.Observation.from_open3d(Array(WALL), Intrinsic, color=color)
     assert np.array_equal(observation.color, PICTURE)
+    # An RGBDImage has both; its color can be gray.
+    pair = SimpleNamespace(depth=memoryview(WALL), color=memoryview(PICTURE))
+    observation = hi.Observation.from_open3d(pair, Intrinsic)
+    assert np.array_equal(observation.color, PICTURE)
+    pair.color = np.zeros(WALL.shape, np.float32)
+    assert hi.Observation.from_open3d(pair, Intrinsic).color is None
+    with pytest.raises(hi.InputError, match="scale is 1000, .* pass 1 / depth_scale"):
+        hi.Observation.from_open3d(WALL, Intrinsic, scale=1000)
+
+
+def test_colors_of_open3d_meshes_are_read():
+    corners, faces = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
+    mesh = SimpleNamespace(vertices=corners, triangles=faces, has_vertex_colors=lambda: False)
+    assert not hi.Model.from_open3d(mesh, unit="m").has_color
+    mesh.has_vertex_colors = lambda: True
+    mesh.vertex_colors = [[1.0, 0.0, 0.5]] * 3
+    model = hi.Model.from_open3d(mesh, unit="cm")
+    assert model.has_color and model.diameter == pytest.approx(np.sqrt(2) / 100)
 
 
 def painted_box():

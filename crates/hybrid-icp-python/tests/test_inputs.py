@@ -170,7 +170,7 @@ def test_masks_that_do_not_fit_the_object_cause_a_warning(scene):
         (lambda: hi.Camera.from_K([[1, 5, 0], [0, 1, 0], [0, 0, 1]], (4, 4)), r"camera matrix entry \[0\]\[1\] is 5"),
         (lambda: hi.Pipeline.preset("hybird"), 'no pipeline is named "hybird"; did you mean "hybrid"'),
         (lambda: hi.Pipeline.from_toml('type = "icq"'), 'did you mean "icp"'),
-        (lambda: hi.Pipeline.from_toml(3), "text_or_path is a int, expected"),
+        (lambda: hi.Pipeline.from_toml(3), "text_or_path is an int, expected"),
         (lambda: hi.Fuser("averag"), 'no fusion method is named "averag"'),
         (lambda: hi.PoseEstimate(np.eye(4), -np.eye(6)), "covariance has the eigenvalue"),
         (lambda: hi.fuse([]), "no estimate to fuse"),

@@ -4,6 +4,8 @@ import copy
 import json
 import math
 import pickle
+import subprocess
+import sys
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -267,6 +269,40 @@ def test_meshes_and_images_of_other_libraries_are_read(scene):
         observation = hi.Observation.from_open3d(depth, Intrinsic(scene.camera), scene.mask)
         assert np.allclose(observation.depth, scene.depth, atol=6e-4)
         assert observation.camera == scene.camera
+
+
+def test_images_with_a_buffer_are_read(scene):
+    """As those of Open3D, which are no arrays."""
+    depth, mask = memoryview(scene.depth), memoryview(scene.mask)
+    observation = hi.Observation(depth, mask, scene.camera)
+    assert np.array_equal(observation.depth, scene.depth)
+    assert np.array_equal(observation.mask, scene.mask)
+    with pytest.raises(hi.InputError, match="depth is a bytes"):
+        hi.Observation(bytes(3), mask, scene.camera)
+
+
+def test_cameras_are_keys_and_name_a_wrong_size(scene):
+    camera = scene.camera
+    same = hi.Camera.from_K(camera.K, (camera.width, camera.height))
+    assert {camera: 1}[same] == 1
+    with pytest.raises(hi.InputError, match=r"size is \(48, 64, 3\), expected \(width, height\)"):
+        hi.Camera.from_K(camera.K, (48, 64, 3))
+
+
+def test_lengths_in_millimeters_and_transposed_poses_are_named(scene):
+    with pytest.raises(hi.InputError, match="delta is 15, expected meters"):
+        hi.vsd(scene.model, scene.observation, scene.true, scene.true, delta=15)
+    with pytest.raises(hi.InputError, match="occlusion_tolerance is 10, expected meters"):
+        hi.mve(scene.model, scene.observation, scene.true, occlusion_tolerance=10)
+    with pytest.raises(hi.InputError, match=r"it may be transposed, pass T_co\.T"):
+        hi.Pipeline().refine(scene.model, scene.observation, scene.true.T)
+
+
+def test_modules_of_the_package_are_imported_at_their_first_use():
+    code = "import hybrid_icp as hi; print(hi.bop.__name__); hi.unknown"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.stdout == "hybrid_icp.bop\n"
+    assert "module 'hybrid_icp' has no attribute 'unknown'" in run.stderr
 
 
 def test_pictures_of_pil_and_other_types_of_arrays_are_read(scene):

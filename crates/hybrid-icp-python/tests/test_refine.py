@@ -214,7 +214,7 @@ def test_an_observer_stops_with_false_and_its_exceptions_are_raised(scene):
 
     with pytest.raises(KeyError, match="mine"):
         pipeline.refine(scene.model, scene.observation, scene.rough, fail)
-    with pytest.raises(hi.InputError, match="observer is a int, expected a callable"):
+    with pytest.raises(hi.InputError, match="observer is an int, expected a callable"):
         pipeline.refine(scene.model, scene.observation, scene.rough, 3)
 
 

@@ -33,7 +33,9 @@ A plate is 0.5 m in front of the camera, and the detector reports 0.54 m:
 ('refined', True)
 """
 
+from importlib import import_module as _import
 from importlib.metadata import version as _version
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from ._errors import FileError, HybridIcpError, InputError, InputWarning
 from ._native import (
@@ -129,3 +131,11 @@ __all__ = [
 ]
 
 __version__ = _version("hybrid-icp")
+
+if not _TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        """Imports a module of the package at its first use, with the library that it needs."""
+        if name in ("adapters", "bop", "plot", "ray", "rerun"):
+            return _import(f"{__name__}.{name}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

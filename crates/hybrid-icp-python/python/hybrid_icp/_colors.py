@@ -18,3 +18,10 @@ def of_trimesh(mesh: Any) -> Any:
     # The origin of trimesh is the lower left corner.
     corners[..., 1] = 1 - corners[..., 1]
     return [np.asarray(image.convert("RGB"))], np.zeros(len(corners), np.uint32), corners
+
+
+def of_open3d(mesh: Any) -> Any:
+    """Returns the argument `colors` of `Model` for a mesh of Open3D; None without colors."""
+    if not mesh.has_vertex_colors():
+        return None
+    return (255 * np.asarray(mesh.vertex_colors)).round().astype(np.uint8)

@@ -14,6 +14,17 @@ _Path = Union[str, os.PathLike[str]]
 _Fields = Union[Mapping[str, object], Sequence[str]]
 _Part = Union[str, Mapping[str, object]]
 
+class _Cloud(Protocol):
+
+    @property
+    def points(self) -> Any:
+        ...
+
+    @property
+    def normals(self) -> Any:
+        ...
+_Points = Union[npt.ArrayLike, tuple[npt.ArrayLike, Union[npt.ArrayLike, None]], _Cloud]
+
 class _OnIteration(Protocol):
 
     def on_iteration(self, event: IterationEvent, /) -> object:
@@ -136,6 +147,9 @@ class Camera:
         """The calibration matrix, shape (3, 3), float64, pixels."""
 
     def __getnewargs__(self) -> tuple[float, float, float, float, int, int]:
+        ...
+
+    def __hash__(self) -> int:
         ...
 
     def __eq__(self, value: object, /) -> bool:
@@ -297,13 +311,15 @@ class Model:
     unit : {"m", "mm", "cm"}, optional
         Unit of the vertices, of `diameter`, and of the offsets and translations of the symmetries.
     samples : int, optional
-        Number of area-uniform surface samples.
+        Number of area-uniform surface samples. Searches and the confidence use them, too: with
+        fewer than some hundred, poses that look alike are overlooked.
     diameter : float, optional
         The diameter that a dataset prescribes. The default is the largest distance between two
         vertices.
     symmetries : array_like, shape (N, 4, 4), optional
-        Discrete symmetries: rigid motions of the object frame that do not change its appearance,
-        without the identity.
+        Discrete symmetries: rigid motions of the object frame that do not change its appearance.
+        List all of them but the identity: for a quarter turn, also the half and the three-quarter
+        turn.
     symmetry_axes : array_like, shape (N, 2, 3), optional
         Continuous symmetries as pairs (axis, offset): any rotation around the line through the
         offset, in `unit`, along the axis.
@@ -356,7 +372,8 @@ class Model:
         Parameters
         ----------
         folder : str or os.PathLike
-            The dataset, or its folder of models.
+            The dataset, or a folder of its models, such as `models_eval`. Without a
+            `models_info.json` there, that of the folder `models` next to it is read.
         obj_id : int
             The number of the object.
 
@@ -380,6 +397,25 @@ class Model:
         ----------
         mesh : trimesh.Trimesh or trimesh.Scene
             The meshes of a scene are one object.
+        unit : {"m", "mm", "cm"}
+            Unit of its coordinates.
+        samples, diameter, symmetries, symmetry_axes
+            As for `Model`.
+
+        Returns
+        -------
+        Model
+        """
+
+    @staticmethod
+    def from_open3d(mesh: Any, *, unit: _Unit, samples: int=1000, diameter: float | None=None, symmetries: npt.ArrayLike | None=None, symmetry_axes: _Axes=...) -> Model:
+        """Creates a model from a triangle mesh of Open3D.
+
+        The colors of its vertices are kept, but no textures.
+
+        Parameters
+        ----------
+        mesh : open3d.geometry.TriangleMesh
         unit : {"m", "mm", "cm"}
             Unit of its coordinates.
         samples, diameter, symmetries, symmetry_axes
@@ -538,15 +574,16 @@ class Observation:
 
         Parameters
         ----------
-        depth : open3d.geometry.Image
-            Depth in integers of `scale` meters, or in floats of meters.
+        depth : open3d.geometry.Image or open3d.geometry.RGBDImage
+            Depth in integers of `scale` meters, or in floats of meters. The color of an `RGBDImage`
+            is used if it has three channels.
         intrinsic : open3d.camera.PinholeCameraIntrinsic
         mask : array_like, shape (H, W), bool or uint8, optional
             Nonzero on the object. By default, every pixel.
         scale : float, optional
-            Meters per unit of integers.
+            Meters per unit of integers: one divided by the `depth_scale` of Open3D.
         color : open3d.geometry.Image or array_like, shape (H, W, 3), uint8, optional
-            The color image of the same pixels, such as `RGBDImage.color`.
+            The color image of the same pixels.
 
         Returns
         -------
@@ -1190,7 +1227,7 @@ class Tracker:
             Camera from object, meters.
         """
 
-def align(source: npt.ArrayLike, target: npt.ArrayLike, T_ts: npt.ArrayLike | None=None, *, source_normals: npt.ArrayLike | None=None, target_normals: npt.ArrayLike | None=None, method: Literal['point-to-plane', 'point-to-point', 'gicp']='point-to-plane', max_distance: float | None=None, voxel: float | None=None, neighbors: int=20) -> Alignment:
+def align(source: _Points, target: _Points, T_ts: npt.ArrayLike | None=None, *, source_normals: npt.ArrayLike | None=None, target_normals: npt.ArrayLike | None=None, method: Literal['point-to-plane', 'point-to-point', 'gicp']='point-to-plane', max_distance: float | None=None, voxel: float | None=None, neighbors: int=20) -> Alignment:
     """Registers two point clouds: finds the pose that moves the source onto the target.
 
     Points that are not finite or at exactly (0, 0, 0) are skipped, with a warning in the result.
@@ -1203,7 +1240,8 @@ def align(source: npt.ArrayLike, target: npt.ArrayLike, T_ts: npt.ArrayLike | No
     Parameters
     ----------
     source, target : array_like, shape (N, 3), float32
-        Points, meters.
+        Points, meters. A point cloud of Open3D, or the pair that `read_cloud` returns, is accepted
+        with its normals.
     T_ts : array_like, shape (4, 4), optional
         The rough pose, target from source, meters. The default is the identity. A translation
         above 100 m is probably in millimeters, and causes a warning.
@@ -1303,7 +1341,7 @@ def vsd(model: Model, observation: Observation, T_est: npt.ArrayLike, T_gt: npt.
     T_est, T_gt : array_like, shape (4, 4)
         The estimated and the true pose, camera from object, meters.
     delta : float, optional
-        Visibility tolerance, meters.
+        Visibility tolerance, meters, 0.015 if not given.
 
     Returns
     -------
@@ -1341,6 +1379,11 @@ def diagnose(model: Model, observation: Observation, T_co: npt.ArrayLike) -> Dia
     InputError
         If the pose is not a rigid motion.
 
+    Warns
+    -----
+    InputWarning
+        If no fault is found, but the inputs do not fit together (`Pipeline.refine`).
+
     Examples
     --------
     A plate is 0.5 m in front of the camera, but its depth was read at ten times its scale:
@@ -1372,9 +1415,9 @@ def mve(model: Model, observation: Observation, T_co: npt.ArrayLike, *, occlusio
         Camera from object, meters.
     occlusion_tolerance : float or None, optional
         Rendered pixels outside the mask do not count if the measured surface hides them by more
-        than this distance, meters. With a negative value, the measured surface can also be that
-        far behind, for masks that miss a part of the object. `None` is the definition of the
-        paper: every rendered pixel counts.
+        than this distance, meters, 0.015 if not given. With a negative value, the measured surface
+        can also be that far behind, for masks that miss a part of the object. `None` is the
+        definition of the paper: every rendered pixel counts.
     imperfect_mask : bool, optional
         Expects the mask of a detector: too large, too small, soft, or a box. `occlusion_tolerance`
         then has no effect.
@@ -1506,7 +1549,8 @@ def point_to_point_step(sources: npt.ArrayLike, targets: npt.ArrayLike) -> tuple
     Raises
     ------
     InputError
-        If the pairs do not determine a step.
+        If there are fewer than three pairs, or numbers that are not finite. Of the steps that fit
+        pairs on a line equally well, the one with the smallest rotation is returned.
 
     Examples
     --------
@@ -1543,7 +1587,8 @@ def point_to_plane_step(sources: npt.ArrayLike, targets: npt.ArrayLike, normals:
     Raises
     ------
     InputError
-        If the pairs do not determine a step.
+        If there are fewer than six pairs, or numbers that are not finite. Directions that the
+        normals do not determine are damped, so they hardly move.
     """
 
 def read_cloud(path: _Path, unit: _Unit='m') -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32] | None]:

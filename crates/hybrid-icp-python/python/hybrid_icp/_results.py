@@ -284,8 +284,9 @@ class Result(_Record):
     plane_rmse : float or None
         Root mean square of the distances from the observed tangent planes, meters.
     information : numpy.ndarray, shape (6, 6), float64, or None
-        Information matrix of the pose; None if the metric has none. It refers to ξ = [ρ; φ], a left
-        perturbation in the camera frame, translation first (meters, radians).
+        Information of the pairs about the pose, JᵀWJ; None if the metric has none. It refers to
+        ξ = [ρ; φ], a left perturbation in the camera frame, translation first (meters, radians).
+        The variance of the residuals is left out: a pose graph needs the inverse of `covariance`.
     covariance : numpy.ndarray, shape (6, 6), float64, or None
         Covariance of the pose in the same convention; None if a direction is not determined. It
         holds if the pairs are right and the residuals are independent.
@@ -425,7 +426,8 @@ class Alignment(_Record):
         Covariance of the pose; None if a direction is not determined. Translation first, meters and
         radians; a left perturbation in the frame of the target.
     warnings : list of str
-        Reasons not to trust the pose, as sentences; empty if there are none.
+        Reasons not to trust the pose, and notes on the preparation of the clouds, such as
+        normals that were estimated, as sentences; empty if there are none.
     """
 
     T_ts: _Array
@@ -477,7 +479,9 @@ class Diagnosis(_Record):
 
     def __str__(self) -> str:
         if not self.faults:
-            return f"no fault found (score {self.score:.3f})"
+            bad = self.score >= 0.3
+            judged = "but the model at the pose does not explain the image" if bad else "it fits"
+            return f"no fault found (score {self.score:.3f}): {judged}"
         ranks = ["fault"] + ["less probable"] * (len(self.faults) - 1)
         lines = (
             f"{rank}: {fault['problem']}\n  fix: {fault['fix']}"

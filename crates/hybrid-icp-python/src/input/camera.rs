@@ -6,7 +6,7 @@ use hybrid_icp::core::{Matrix3, PinholeCamera, PixelCenters};
 use pyo3::prelude::*;
 
 use crate::array::{self, Matrix};
-use crate::errors::{self, FileError};
+use crate::errors::{self, FileError, InputError};
 
 /// A pinhole camera without distortion, in the frame of OpenCV.
 ///
@@ -33,6 +33,25 @@ use crate::errors::{self, FileError};
 #[pyclass(frozen, eq, module = "hybrid_icp", name = "Camera", from_py_object)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PyCamera(pub(crate) PinholeCamera);
+
+/// The width and the height of an image.
+struct Size(u32, u32);
+
+impl<'py> FromPyObject<'_, 'py> for Size {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let expected = "(width, height) in pixels, such as (640, 480); the shape of an array is \
+                        (height, width)";
+        let size = value
+            .extract::<[u32; 2]>()
+            .map(|[width, height]| Self(width, height));
+        size.map_err(|_| match value.repr() {
+            Ok(found) => InputError::new_err(format!("size is {found}, expected {expected}")),
+            Err(error) => error,
+        })
+    }
+}
 
 #[pymethods]
 impl PyCamera {
@@ -79,10 +98,10 @@ impl PyCamera {
     #[staticmethod]
     #[pyo3(name = "from_K")]
     #[allow(non_snake_case)]
-    fn from_k(K: &Bound<'_, PyAny>, size: [u32; 2]) -> PyResult<Self> {
+    fn from_k(K: &Bound<'_, PyAny>, size: Size) -> PyResult<Self> {
         let expected = "a (3, 3) matrix [fx 0 cx; 0 fy cy; 0 0 1], pixels";
         let (numbers, _) = array::numbers::<f64>(K, &[Some(3), Some(3)], "K", expected)?;
-        PinholeCamera::from_matrix(&Matrix3::from_row_slice(&numbers), size[0], size[1])
+        PinholeCamera::from_matrix(&Matrix3::from_row_slice(&numbers), size.0, size.1)
             .map(Self)
             .map_err(errors::input)
     }
@@ -105,8 +124,8 @@ impl PyCamera {
     /// FileError
     ///     If the file cannot be read, has no camera, or has lens distortion.
     #[staticmethod]
-    fn from_file(py: Python<'_>, path: PathBuf, size: [u32; 2]) -> PyResult<Self> {
-        let file = py.detach(|| hicp_io::read_camera(&path, size.into()));
+    fn from_file(py: Python<'_>, path: PathBuf, size: Size) -> PyResult<Self> {
+        let file = py.detach(|| hicp_io::read_camera(&path, (size.0, size.1)));
         let file = file.map_err(errors::file)?;
         match file.distortion {
             None => Ok(Self(file.camera)),
@@ -165,6 +184,10 @@ impl PyCamera {
         let camera = &self.0;
         let [fx, fy, cx, cy] = [camera.fx(), camera.fy(), camera.cx(), camera.cy()];
         (fx, fy, cx, cy, camera.width(), camera.height())
+    }
+
+    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
+        self.__getnewargs__().into_pyobject(py)?.hash()
     }
 
     fn __repr__(&self) -> String {

@@ -36,13 +36,15 @@ use crate::input::color;
 /// unit : {"m", "mm", "cm"}, optional
 ///     Unit of the vertices, of `diameter`, and of the offsets and translations of the symmetries.
 /// samples : int, optional
-///     Number of area-uniform surface samples.
+///     Number of area-uniform surface samples. Searches and the confidence use them, too: with
+///     fewer than some hundred, poses that look alike are overlooked.
 /// diameter : float, optional
 ///     The diameter that a dataset prescribes. The default is the largest distance between two
 ///     vertices.
 /// symmetries : array_like, shape (N, 4, 4), optional
-///     Discrete symmetries: rigid motions of the object frame that do not change its appearance,
-///     without the identity.
+///     Discrete symmetries: rigid motions of the object frame that do not change its appearance.
+///     List all of them but the identity: for a quarter turn, also the half and the three-quarter
+///     turn.
 /// symmetry_axes : array_like, shape (N, 2, 3), optional
 ///     Continuous symmetries as pairs (axis, offset): any rotation around the line through the
 ///     offset, in `unit`, along the axis.
@@ -164,7 +166,8 @@ impl PyModel {
     /// Parameters
     /// ----------
     /// folder : str or os.PathLike
-    ///     The dataset, or its folder of models.
+    ///     The dataset, or a folder of its models, such as `models_eval`. Without a
+    ///     `models_info.json` there, that of the folder `models` next to it is read.
     /// obj_id : int
     ///     The number of the object.
     ///
@@ -234,6 +237,48 @@ impl PyModel {
             py,
             vertices,
             faces,
+            unit,
+            samples,
+            diameter,
+            symmetries,
+            symmetry_axes,
+            colors.as_ref(),
+        )
+    }
+
+    /// Creates a model from a triangle mesh of Open3D.
+    ///
+    /// The colors of its vertices are kept, but no textures.
+    ///
+    /// Parameters
+    /// ----------
+    /// mesh : open3d.geometry.TriangleMesh
+    /// unit : {"m", "mm", "cm"}
+    ///     Unit of its coordinates.
+    /// samples, diameter, symmetries, symmetry_axes
+    ///     As for `Model`.
+    ///
+    /// Returns
+    /// -------
+    /// Model
+    #[staticmethod]
+    #[pyo3(signature = (mesh, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Axes::default()))]
+    fn from_open3d(
+        py: Python<'_>,
+        mesh: &Bound<'_, PyAny>,
+        unit: &str,
+        samples: usize,
+        diameter: Option<f64>,
+        symmetries: Option<&Bound<'_, PyAny>>,
+        symmetry_axes: Axes,
+    ) -> PyResult<Self> {
+        let module = py.import("hybrid_icp._colors")?;
+        let colors = module.call_method1("of_open3d", (mesh,))?;
+        let colors = (!colors.is_none()).then_some(colors);
+        Self::new(
+            py,
+            &mesh.getattr("vertices")?,
+            &mesh.getattr("triangles")?,
             unit,
             samples,
             diameter,

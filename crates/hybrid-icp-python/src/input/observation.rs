@@ -272,32 +272,52 @@ impl PyObservation {
     ///
     /// Parameters
     /// ----------
-    /// depth : open3d.geometry.Image
-    ///     Depth in integers of `scale` meters, or in floats of meters.
+    /// depth : open3d.geometry.Image or open3d.geometry.RGBDImage
+    ///     Depth in integers of `scale` meters, or in floats of meters. The color of an `RGBDImage`
+    ///     is used if it has three channels.
     /// intrinsic : open3d.camera.PinholeCameraIntrinsic
     /// mask : array_like, shape (H, W), bool or uint8, optional
     ///     Nonzero on the object. By default, every pixel.
     /// scale : float, optional
-    ///     Meters per unit of integers.
+    ///     Meters per unit of integers: one divided by the `depth_scale` of Open3D.
     /// color : open3d.geometry.Image or array_like, shape (H, W, 3), uint8, optional
-    ///     The color image of the same pixels, such as `RGBDImage.color`.
+    ///     The color image of the same pixels.
     ///
     /// Returns
     /// -------
     /// Observation
     #[staticmethod]
     #[pyo3(signature = (depth, intrinsic, mask = None, *, scale = 0.001, color = None))]
-    fn from_open3d(
-        py: Python<'_>,
-        depth: &Bound<'_, PyAny>,
-        intrinsic: &Bound<'_, PyAny>,
-        mask: Option<&Bound<'_, PyAny>>,
+    fn from_open3d<'py>(
+        py: Python<'py>,
+        depth: &Bound<'py, PyAny>,
+        intrinsic: &Bound<'py, PyAny>,
+        mask: Option<&Bound<'py, PyAny>>,
         scale: f64,
-        color: Option<&Bound<'_, PyAny>>,
+        color: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Self> {
+        if scale > 1.0 {
+            let text = format!(
+                "scale is {scale}, expected meters per unit, such as 0.001: the depth_scale of \
+                 Open3D is units per meter, so pass 1 / depth_scale"
+            );
+            return Err(InputError::new_err(text));
+        }
         let numpy = py.import("numpy")?;
-        let color = color.map(|color| numpy.call_method1("asarray", (color,)));
-        let depth = numpy.call_method1("asarray", (depth,))?;
+        let array = |value: &Bound<'py, PyAny>| numpy.call_method1("asarray", (value,));
+        let (depth, of_pair) = match depth.getattr_opt("depth")? {
+            Some(of_pair) => (array(&of_pair)?, Some(array(&depth.getattr("color")?)?)),
+            None => (array(depth)?, None),
+        };
+        let is_color = |color: &Bound<'_, PyAny>| {
+            let dimensions = color.getattr("ndim")?.extract::<usize>();
+            dimensions.map(|dimensions| dimensions == 3)
+        };
+        let color = match (color, of_pair) {
+            (Some(color), _) => Some(array(color)?),
+            (None, Some(color)) if is_color(&color)? => Some(color),
+            _ => None,
+        };
         let kind: String = depth.getattr("dtype")?.getattr("kind")?.extract()?;
         let size = (intrinsic.getattr("width")?, intrinsic.getattr("height")?);
         let calibration = intrinsic.getattr("intrinsic_matrix")?;
@@ -305,7 +325,6 @@ impl PyObservation {
             .get_type::<PyCamera>()
             .call_method1("from_K", (calibration, size))?;
         let scale = (kind != "f").then_some(scale);
-        let color = color.transpose()?;
         let (camera, color) = (camera.extract()?, color.as_ref());
         Self::new(py, &depth, mask, camera, scale, color, None)
     }
