@@ -20,10 +20,7 @@ pub struct ModelFolder {
 }
 
 impl ModelFolder {
-    /// Opens a folder and reads its `models_info.json`.
-    ///
-    /// If it has none, reads that of the folder `models` next to it, as of BOP's `models_eval`. If
-    /// there is none either, objects have no symmetries and the diameter of their mesh.
+    /// Opens a folder and reads its `models_info.json` if there is one.
     ///
     /// # Errors
     ///
@@ -39,10 +36,7 @@ impl ModelFolder {
     /// As for [`ReadLimits::read_models_info`].
     pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref();
-        let own = dir.join("models_info.json");
-        let sibling = dir.with_file_name("models").join("models_info.json");
-        let has_own = !is_absent(&own) || is_absent(&sibling);
-        Self::with_info(limits, dir, if has_own { own } else { sibling })
+        Self::with_info(limits, dir, dir.join("models_info.json"))
     }
 
     /// Opens a folder as [`ModelFolder::open`] does, within `limits`, with the diameters and

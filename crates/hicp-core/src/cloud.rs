@@ -49,7 +49,15 @@ impl Cloud {
     pub fn without_normals(points: impl IntoIterator<Item = Point3<f32>>) -> Self {
         let normal = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
         let surfels = points.into_iter().map(|point| Surfel { point, normal });
-        Self::of(surfels, |_| true).with_normals_from(0)
+        Self::with_some_normals(surfels).with_normals_from(0)
+    }
+
+    /// Creates a cloud in which points without a normal have one of NaN, for a metric that does not
+    /// use normals.
+    ///
+    /// Skips other points as [`Cloud::new`] does.
+    pub fn with_some_normals(surfels: impl IntoIterator<Item = Surfel>) -> Self {
+        Self::of(surfels, |_| true)
     }
 
     fn of(surfels: impl IntoIterator<Item = Surfel>, has_normal: impl Fn(&Surfel) -> bool) -> Self {

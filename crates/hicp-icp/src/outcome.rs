@@ -144,7 +144,7 @@ pub struct Quality {
     /// Root mean square of the distances between the points of the pairs, meters.
     pub point_rmse: f64,
     /// Root mean square of the distances of the model points to the observed tangent planes,
-    /// meters.
+    /// meters. Observed points without a normal do not count.
     pub plane_rmse: f64,
     /// The metric's normal equations at the pose: the information of the pairs about its six
     /// directions.
@@ -183,17 +183,22 @@ impl Quality {
             return None;
         }
         let count = pairs.len() as f64;
-        let (mut points, mut planes) = (0.0, 0.0);
+        let (mut points, mut planes, mut without_normal) = (0.0, 0.0, 0.0);
         for pair in pairs.as_slice() {
             let difference = (pair.source.point - pair.target.point).cast::<f64>();
             points += difference.norm_squared();
-            planes += pair.target.normal.cast::<f64>().dot(&difference).powi(2);
+            let plane = pair.target.normal.cast::<f64>().dot(&difference).powi(2);
+            if plane.is_nan() {
+                without_normal += 1.0;
+            } else {
+                planes += plane;
+            }
         }
         Some(Self {
             // Several pairs per point must not give a share above 1.
             fitness: (count / pairs.n_candidates().max(1) as f64).min(1.0),
             point_rmse: (points / count).sqrt(),
-            plane_rmse: (planes / count).sqrt(),
+            plane_rmse: (planes / f64::max(count - without_normal, 1.0)).sqrt(),
             system: metric.system(iteration, pairs),
         })
     }
@@ -299,6 +304,19 @@ impl Outcome {
             iterations: 0,
             evaluation: None,
             quality: None,
+        }
+    }
+
+    /// Returns the outcome with another reason why the stage ended.
+    #[must_use]
+    pub fn ended_by(self, termination: Termination) -> Self {
+        Self {
+            termination,
+            verdict: match self.verdict {
+                Verdict::Refined => Verdict::Refined,
+                Verdict::KeptInitial(_) => Verdict::KeptInitial(termination),
+            },
+            ..self
         }
     }
 

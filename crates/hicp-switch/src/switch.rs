@@ -70,7 +70,7 @@ impl<W: Switcher, S: Stage> Stage for SwitchAmong<W, S> {
         let last = self.stages.len().saturating_sub(1);
         match self.stages.get_mut(event.regime.0.min(last)) {
             Some(stage) => stage.run(problem, init, session),
-            None => Outcome::kept(init, Termination::IterationLimit),
+            None => Outcome::kept(init, Termination::Kept),
         }
     }
 

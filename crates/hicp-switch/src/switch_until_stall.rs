@@ -50,7 +50,7 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for SwitchUntilStall<W, A, M> {
         };
         let score = |event: &RegimeEvent| event.score.unwrap_or(f64::MAX);
         let mut held = judge(init, session);
-        let mut best = Outcome::kept(init, Termination::IterationLimit);
+        let mut best = Outcome::kept(init, Termination::Kept);
         let mut iterations = 0;
         let mut other = false;
         for step in 0..self.max_steps {
@@ -90,7 +90,11 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for SwitchUntilStall<W, A, M> {
                 };
             }
             let stalled = gain < self.min_gain;
-            if next.termination == Termination::Stopped || (stalled && other) {
+            if next.termination == Termination::Stopped {
+                best = best.ended_by(Termination::Stopped);
+                break;
+            }
+            if stalled && other {
                 break;
             }
             other = stalled;

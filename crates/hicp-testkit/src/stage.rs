@@ -40,8 +40,8 @@ impl Default for StageLaws {
 ///   most the counted iterations.
 /// - Pure: a fresh, a used and a boxed stage give the same bits, with a fresh and with a used
 ///   workspace.
-/// - If the observer stops the stage at the first iteration, the result is valid, its reason is
-///   [`Termination::Stopped`], and the observer receives no other iteration.
+/// - If the observer stops the stage at the first, the second or the last iteration, the result is
+///   valid, its reason is [`Termination::Stopped`], and the observer receives no other iteration.
 ///
 /// # Panics
 ///
@@ -69,16 +69,17 @@ pub fn check_stage<T: Stage + 'static>(make: impl Fn() -> T, laws: StageLaws) {
             let law = "if nothing is observed, the initial pose is returned bit for bit";
             trial.same(law, init, &outcome.camera_from_object);
         }
-        let mut stopper = Stopper(0);
-        let stopped = trial.calm(|| run(&mut make(), &mut workspace(), &case, &mut stopper));
-        finite(&trial, init, &stopped);
-        let ended = match stopper.0 {
-            0 => true,
-            1 => stopped.termination == Termination::Stopped,
-            _ => false,
-        };
-        let law = "a stage that the observer stops ends as `Stopped`, and runs nothing else";
-        trial.holds(law, ended, format_args!("{stopped:?}"));
+        for at in [1, 2, reported.len()] {
+            let mut stopper = Stopper { at, calls: 0 };
+            let stopped = trial.calm(|| run(&mut make(), &mut workspace(), &case, &mut stopper));
+            finite(&trial, init, &stopped);
+            let ended = match stopper.calls {
+                calls if calls < at => true,
+                calls => calls == at && stopped.termination == Termination::Stopped,
+            };
+            let law = "a stage that the observer stops ends as `Stopped`, and runs nothing else";
+            trial.holds(law, at == 0 || ended, format_args!("{stopped:?}"));
+        }
     }
 }
 
@@ -103,13 +104,20 @@ impl Observer for Reported {
     }
 }
 
-/// An observer that stops at the first iteration, and counts its calls.
-struct Stopper(usize);
+/// An observer that stops at one of its calls, and counts them.
+struct Stopper {
+    at: usize,
+    calls: usize,
+}
 
 impl Observer for Stopper {
     fn on_iteration(&mut self, _event: &IterationEvent<'_>) -> ControlFlow<()> {
-        self.0 += 1;
-        ControlFlow::Break(())
+        self.calls += 1;
+        if self.calls < self.at {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
     }
 }
 

@@ -32,7 +32,8 @@ use crate::results;
 ///     The rough pose, target from source, meters. The default is the identity. A translation
 ///     above 100 m is probably in millimeters, and causes a warning.
 /// source_normals, target_normals : array_like, shape (N, 3), float32, optional
-///     One normal per point, of any length above 0. Points whose normal is zero are skipped.
+///     One normal per point, of any length above 0. Points whose normal is zero are skipped, except
+///     for targets of "point-to-point".
 /// method : {"point-to-plane", "point-to-point", "gicp"}, optional
 ///     The error to minimize.
 /// max_distance : float, optional
@@ -177,12 +178,17 @@ impl Observer for Signals {
     }
 }
 
-/// Returns the points of a cloud, and its normals if it has some: of one of Open3D, or of the pair
-/// that `read_cloud` returns. Anything else is points.
+/// Returns the points and, if present, the normals of a cloud.
+///
+/// Accepts a cloud of Open3D, the pair that `read_cloud` returns, or an array of points.
 fn parts<'py>(
     cloud: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<Bound<'py, PyAny>>)> {
-    let is_matrix = |value: &Bound<'_, PyAny>| value.len().is_ok_and(|rows| rows > 3);
+    // In a pair of points, the first one has no rows.
+    let is_matrix = |value: &Bound<'_, PyAny>| {
+        let row = value.get_item(0).and_then(|row| row.len());
+        row.is_ok() || value.len().is_ok_and(|rows| rows == 0)
+    };
     if let Ok((points, normals)) = cloud.extract::<(Bound<'_, PyAny>, Option<Bound<'_, PyAny>>)>()
         && (normals.is_none() || is_matrix(&points))
     {
@@ -191,7 +197,7 @@ fn parts<'py>(
     if let (Some(points), Some(normals)) =
         (cloud.getattr_opt("points")?, cloud.getattr_opt("normals")?)
     {
-        let has_normals = normals.len()? > 0;
+        let has_normals = normals.len().is_ok_and(|rows| rows > 0);
         return Ok((points, has_normals.then_some(normals)));
     }
     Ok((cloud.clone(), None))

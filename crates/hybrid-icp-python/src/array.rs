@@ -93,7 +93,7 @@ pub(crate) fn as_array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<B
         }
         return Ok(value.clone());
     }
-    // Images of Open3D have neither, but their memory as a buffer of two or three dimensions.
+    // Images of Open3D have neither, but they support the buffer protocol.
     let is_image = || {
         let buffer = PyMemoryView::from(value)?;
         buffer.getattr("ndim")?.extract::<usize>()

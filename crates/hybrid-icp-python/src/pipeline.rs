@@ -238,7 +238,7 @@ impl PyPipeline {
     /// observer : callable or object, optional
     ///     A callable receives an `IterationEvent` per iteration. An object can have any of the
     ///     methods `on_iteration`, `on_regime`, `on_decision` and `on_stage_end`. If one of them
-    ///     returns `False`, the run stops at the pose last evaluated. An exception stops the run
+    ///     returns `False`, the run stops at the last accepted pose. An exception stops the run
     ///     and is raised again.
     ///
     /// Returns

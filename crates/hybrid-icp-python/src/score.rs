@@ -97,7 +97,7 @@ pub(crate) fn mve(
 
 /// Returns a tolerance in meters, or an error if it is probably in millimeters.
 fn tolerance(name: &str, meters: f64) -> PyResult<f64> {
-    if meters.abs() < 1.0 {
+    if meters.abs() < 1.0 || !meters.is_finite() {
         return Ok(meters);
     }
     let text = format!("{name} is {meters}, expected meters between -1 and 1, such as 0.015");

@@ -11,7 +11,8 @@ import hybrid_icp as hi
 def test_inputs_that_fit_have_no_fault(scene):
     diagnosis = hi.diagnose(scene.model, scene.observation, scene.rough)
     assert diagnosis.faults == [] and diagnosis.score < 0.2
-    assert str(diagnosis) == f"no fault found (score {diagnosis.score:.3f}): it fits"
+    text = "the model at the pose explains the image"
+    assert str(diagnosis) == f"no fault found (score {diagnosis.score:.3f}): {text}"
 
 
 def test_a_fault_is_named_with_its_fix_and_numbers(scene):

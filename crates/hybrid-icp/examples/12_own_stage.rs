@@ -6,7 +6,7 @@ use std::error::Error;
 
 use hybrid_icp::Preset;
 use hybrid_icp::core::{Isometry3, Problem, Translation3};
-use hybrid_icp::icp::{Outcome, Session, Stage, Verdict};
+use hybrid_icp::icp::{Outcome, Session, Stage, Termination, Verdict};
 use hybrid_icp::score::{MeanVsd, Score};
 
 mod scene;
@@ -33,7 +33,10 @@ impl<S: Stage> Stage for AlongTheRay<S> {
         let mut best = self.stage.run(problem, init, session);
         let mut best_mve = mve(session, &best);
         let mut iterations = best.iterations;
-        let Some(model) = problem.model() else {
+        let Some(model) = problem
+            .model()
+            .filter(|_| best.termination != Termination::Stopped)
+        else {
             return best;
         };
         let ray = (init * model.center()).coords.normalize();
@@ -41,6 +44,10 @@ impl<S: Stage> Stage for AlongTheRay<S> {
             let start = Translation3::from(ray * *offset) * init;
             let outcome = self.stage.run(problem, &start, session);
             iterations += outcome.iterations;
+            if outcome.termination == Termination::Stopped {
+                best = best.ended_by(Termination::Stopped); // The observer ends the whole run.
+                break;
+            }
             // A stage that keeps its start has not evaluated it.
             if outcome.verdict == Verdict::Refined {
                 let score = mve(session, &outcome);

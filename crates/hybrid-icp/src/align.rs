@@ -75,7 +75,7 @@ impl CloudOptions {
     /// Creates the target of a registration, as [`CloudOptions::cloud`] does.
     ///
     /// If the error does not depend on normals, no point is skipped for lack of one: scans of lines
-    /// and edges determine none. The cloud then has no normals at all.
+    /// and edges determine none ([`Cloud::with_some_normals`]).
     ///
     /// # Errors
     ///
@@ -86,17 +86,11 @@ impl CloudOptions {
         points: &[Point3<f32>],
         normals: Option<&[UnitVector3<f32>]>,
     ) -> Result<Cloud, NormalCount> {
-        let cloud = self.cloud(points, normals)?;
-        if registration != Registration::PointToPoint || cloud.n_skipped() == 0 {
-            return Ok(cloud);
-        }
-        let bare = Self {
-            neighbors: 0,
-            ..*self
+        let create = match registration {
+            Registration::PointToPoint => Cloud::with_some_normals,
+            _ => Cloud::new,
         };
-        let bare = bare.cloud(points, None)?;
-        let more = bare.surfels().len() > cloud.surfels().len();
-        Ok(if more { bare } else { cloud })
+        self.create(points, normals, create)
     }
 
     /// Creates a cloud from points in meters, with unit normals if there are any.
@@ -111,6 +105,15 @@ impl CloudOptions {
         &self,
         points: &[Point3<f32>],
         normals: Option<&[UnitVector3<f32>]>,
+    ) -> Result<Cloud, NormalCount> {
+        self.create(points, normals, Cloud::new)
+    }
+
+    fn create(
+        &self,
+        points: &[Point3<f32>],
+        normals: Option<&[UnitVector3<f32>]>,
+        create: fn(Vec<Surfel>) -> Cloud,
     ) -> Result<Cloud, NormalCount> {
         if let Some(normals) = normals
             && normals.len() != points.len()
@@ -150,10 +153,10 @@ impl CloudOptions {
             let unknown = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
             let normals = estimate_normals(&points, self.neighbors).into_iter();
             let normals = normals.map(|normal| normal.unwrap_or(unknown));
-            let cloud = Cloud::new(points.iter().zip(normals).map(surfel));
+            let cloud = create(points.iter().zip(normals).map(surfel).collect());
             return Ok(cloud.with_normals_from(self.neighbors));
         };
-        Ok(Cloud::new(points.iter().zip(normals).map(surfel)))
+        Ok(create(points.iter().zip(normals).map(surfel).collect()))
     }
 }
 

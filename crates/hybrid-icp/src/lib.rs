@@ -120,7 +120,7 @@ pub use warning::{CenterFault, Warning};
 
 /// The names that refine a pose and compose the paper's pipeline: `use hybrid_icp::prelude::*;`.
 ///
-/// Everything else is in the modules. The traits of custom parts are in those of
+/// Everything else is in the modules. Traits of custom parts are in the modules of
 /// [their roles](crate#parts-by-role).
 pub mod prelude {
     pub use crate::{Preset, Refinement, Refiner, presets};

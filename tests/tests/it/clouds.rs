@@ -535,10 +535,41 @@ fn point_to_point_keeps_target_points_without_a_normal() {
     let found = register(Registration::PointToPoint);
     let (angle, distance) = se3::pose_distance(&found.target_from_source(), &truth);
     assert!(angle < 1e-4 && distance < 1e-4, "{angle} {distance}");
-    assert_eq!((found.fitness(), found.warnings), (1.0, vec![]));
+    let estimated = CloudWarning::NormalsEstimated {
+        side: CloudSide::Target,
+        neighbors: 20,
+    };
+    assert_eq!((found.fitness(), found.warnings), (1.0, vec![estimated]));
     // The other errors need normals, so they skip points, with a warning.
     for kind in [Registration::PointToPlane, Registration::Generalized] {
         let skipped = |w: &CloudWarning| matches!(w, CloudWarning::PointsSkipped { .. });
         assert!(register(kind).warnings.iter().any(skipped), "{kind:?}");
     }
+}
+
+/// The other points of such a target keep their normals, for the warnings.
+#[test]
+fn points_without_a_normal_hide_no_open_direction() {
+    let source = view(Household::Can, 12_000, 0.0, 1e-3);
+    let mut target = view(Household::Can, 13_000, 1.0, 1e-3);
+    let cable = (0..30_u8).map(|i| Point3::new(0.5, 0.0, 0.01 * f32::from(i)));
+    let kind = Registration::PointToPoint;
+    let options = CloudOptions::default();
+    let source = options.for_source_of(kind).cloud(&source, None).unwrap();
+    let mut align = |points: &[Point3<f32>]| {
+        let target = options.target_of(kind, points, None).unwrap();
+        assert_eq!(target.n_skipped(), 0);
+        align(
+            &source,
+            &target,
+            &Isometry3::identity(),
+            &mut kind.build(None),
+        )
+    };
+    let alone = align(&target);
+    target.extend(cable);
+    let found = align(&target);
+    assert!(matches!(open(&alone), Some((1, Some(_)))), "{alone:?}");
+    assert_eq!(open(&found), open(&alone));
+    assert_eq!(found.outcome.quality, alone.outcome.quality);
 }

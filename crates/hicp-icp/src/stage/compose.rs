@@ -128,7 +128,7 @@ impl<S: Stage> Stage for Repeat<S> {
                 break;
             }
         }
-        outcome.unwrap_or_else(|| Outcome::kept(init, Termination::IterationLimit))
+        outcome.unwrap_or_else(|| Outcome::kept(init, Termination::Kept))
     }
 
     fn time_limit(&self) -> Option<Duration> {

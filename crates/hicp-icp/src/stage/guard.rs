@@ -46,9 +46,13 @@ impl<S: Stage, C: Score> Stage for Guard<S, C> {
         if kept {
             outcome
         } else {
+            let reason = match outcome.termination {
+                Termination::Stopped => Termination::Stopped,
+                _ => Termination::ScoreNotImproved,
+            };
             Outcome {
                 iterations: outcome.iterations,
-                ..Outcome::kept(init, Termination::ScoreNotImproved)
+                ..Outcome::kept(init, reason)
             }
         }
     }
@@ -88,7 +92,7 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
         }
         let first = self.score.score(&mut session.context(problem), init);
         let mut best = (first, Outcome::kept(init, Termination::ScoreNotImproved));
-        let mut last = Outcome::kept(init, Termination::IterationLimit);
+        let mut last = Outcome::kept(init, Termination::Kept);
         for time in 0..self.times {
             let next = self.stage.run(problem, &last.camera_from_object, session);
             last = if time == 0 { next } else { last.then(next) };
@@ -111,9 +115,13 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
                 break;
             }
         }
-        Outcome {
+        let best = Outcome {
             iterations: last.iterations,
             ..best.1
+        };
+        match last.termination {
+            reason @ Termination::Stopped => best.ended_by(reason),
+            _ => best,
         }
     }
 

@@ -20,6 +20,8 @@ use crate::session::Session;
 /// - The returned pose was evaluated, or is `init` bit for bit.
 /// - Pure: equal inputs give equal bits, whatever ran before. `&mut self` and the session's
 ///   workspace are scratch.
+/// - After a break of the observer, it ends with [`Termination::Stopped`](crate::Termination), and
+///   calls the observer for no other iteration.
 /// - A warm run (the same stage and workspace before, on inputs that are not larger) allocates
 ///   nothing on the heap.
 ///

@@ -100,12 +100,14 @@ impl Confidence {
         };
         let mut grid = Grid::new(diameter);
         grid.compare(observation, view);
+        let view_area = view.region().area();
         find_insides(&mut grid);
         let evidence = Evidence::of(&grid);
-        let (width, height) = observation.camera().size();
+        let of_image = view_area == observation.camera().region().area();
+        let cells = grid.width * grid.height * grid.step.pow(2);
         let judged = model.has_possible_diameter()
             && grid.distance() >= NEAREST * diameter
-            && evidence.pixels < width as usize * height as usize;
+            && !(of_image && evidence.pixels == cells);
         let confidence = if judged && evidence.agrees > 0.0 {
             let features = Self::features(&evidence, &Misfit::of(&grid), mve, look_alikes);
             Self::of(&features, diameter)

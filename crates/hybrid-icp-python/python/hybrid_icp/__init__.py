@@ -136,6 +136,6 @@ if not _TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
         """Imports a module of the package at its first use, with the library that it needs."""
-        if name in ("adapters", "bop", "plot", "ray", "rerun"):
+        if name in ("adapters", "bop", "plot", "rerun"):
             return _import(f"{__name__}.{name}")
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -479,8 +479,12 @@ class Diagnosis(_Record):
 
     def __str__(self) -> str:
         if not self.faults:
-            bad = self.score >= 0.3
-            judged = "but the model at the pose does not explain the image" if bad else "it fits"
+            judged = "the model at the pose explains the image"
+            if self.score >= 0.3:
+                judged = (
+                    "the model at the pose does not explain the image, or the mask shows more than"
+                    " the object"
+                )
             return f"no fault found (score {self.score:.3f}): {judged}"
         ranks = ["fault"] + ["less probable"] * (len(self.faults) - 1)
         lines = (

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use hicp_bop::ModelFolder;
-use hicp_io::LengthUnit;
 use hicp_io::bop::Dataset;
+use hicp_io::{LengthUnit, ReadLimits};
 use hybrid_icp::checks::warnings_of_model;
 use hybrid_icp::core::{
     MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Model, ModelConfig, Point3, Symmetries, SymmetryAxis,
@@ -187,7 +187,12 @@ impl PyModel {
                     true => Dataset::open(&folder)?.models_dir()?.to_path_buf(),
                     false => folder.clone(),
                 };
-                ModelFolder::open(models)?.read(obj_id)
+                let places = [models.clone(), models.join("../models")];
+                let mut infos = places
+                    .map(|place| place.join("models_info.json"))
+                    .into_iter();
+                let info = infos.find(|info| info.exists()).unwrap_or_default();
+                ModelFolder::with_info(ReadLimits::DEFAULT, models, info)?.read(obj_id)
             })
             .map_err(errors::file)?;
         model.map(Self::of).ok_or_else(|| {

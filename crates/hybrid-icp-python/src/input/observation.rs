@@ -310,8 +310,8 @@ impl PyObservation {
             None => (array(depth)?, None),
         };
         let is_color = |color: &Bound<'_, PyAny>| {
-            let dimensions = color.getattr("ndim")?.extract::<usize>();
-            dimensions.map(|dimensions| dimensions == 3)
+            let shape = color.getattr("shape")?.extract::<Vec<usize>>();
+            shape.map(|shape| matches!(shape[..], [_, _, 3]))
         };
         let color = match (color, of_pair) {
             (Some(color), _) => Some(array(color)?),

@@ -220,7 +220,8 @@ pub(super) fn undetermined(
 /// Returns the motions that the surface determines, without the information of noise.
 ///
 /// Noise of normals adds its square to the JᵀJ of the target. In ½ (JᵀK + KᵀJ), where K has normals
-/// that are estimated from the points of the source alone, its mean is zero.
+/// that are estimated from the points of the source alone, its mean is zero. If most points have no
+/// normal, as on lines, returns `None`.
 fn surface(
     of_pairs: &Observability,
     pairs: &Correspondences,
@@ -233,8 +234,13 @@ fn surface(
     let points: Vec<_> = some.clone().map(|pair| pair.source.point).collect();
     let normals = estimate_normals(&points, neighbors.max(points.len() / PATCHES));
     let mut common = NormalEquations::new(of_pairs.pivot, of_pairs.length);
+    let mut used = 0;
     for (pair, normal) in some.zip(normals) {
-        let Some(normal) = normal else { continue };
+        let has_normal = pair.target.normal.iter().all(|x| x.is_finite());
+        let Some(normal) = normal.filter(|_| has_normal) else {
+            continue;
+        };
+        used += 1;
         let (point, weight) = (pair.source.point.cast::<f64>(), f64::from(pair.weight));
         let target = pair.target.normal.into_inner().cast::<f64>();
         let source = normal.into_inner().cast::<f64>();
@@ -242,7 +248,7 @@ fn surface(
         common.add_row(&point, &((target + source) / 2.0), 0.0, weight);
         common.add_row(&point, &((target - source) / 2.0), 0.0, -weight);
     }
-    common.observability()
+    common.observability().filter(|_| 2 * used > points.len())
 }
 
 /// Returns the warning about two clouds whose extents differ as if their units did.

@@ -463,16 +463,10 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
             &run.distinct,
             &mut run.session.workspace.alternatives,
         );
-        let ended = if run.stopped {
-            Some(Termination::Stopped)
-        } else {
-            run.clock.is_over().then_some(Termination::Deadline)
-        };
-        if let Some(reason) = ended {
-            returned.termination = reason;
-            if returned.verdict != Verdict::Refined {
-                returned.verdict = Verdict::KeptInitial(reason);
-            }
+        if run.stopped {
+            returned = returned.ended_by(Termination::Stopped);
+        } else if run.clock.is_over() {
+            returned = returned.ended_by(Termination::Deadline);
         }
         Outcome {
             iterations: run.iterations,
