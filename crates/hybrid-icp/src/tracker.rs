@@ -50,8 +50,8 @@ const NEAR_DIAMETERS: f64 = 0.4;
 /// likely, it stays doubtful until an image shows the difference.
 ///
 /// Cost of a step while tracking: about that of `hybrid`, including the observation. A step that
-/// searches for the object costs about 0.1 s, and rarely up to 1 s. Use one tracker per object and
-/// thread.
+/// searches for the object takes some tens of milliseconds, and rarely up to 0.4 s. Use one tracker
+/// per object and thread.
 ///
 /// ```
 /// use hicp_sim::{DepthSensor, Household, MovingConfig, MovingScene, rng};
