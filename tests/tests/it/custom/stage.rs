@@ -51,9 +51,14 @@ impl<S: Stage, C: Score> Stage for BothWays<S, C> {
         // The rotated pose itself was never evaluated, so it must have been refined.
         let better =
             outcomes[1].verdict == Verdict::Refined && score(&outcomes[1]) < score(&outcomes[0]);
+        let stopped = outcomes[1].termination == Termination::Stopped;
         let chosen = &mut outcomes[usize::from(better)];
         chosen.iterations = iterations;
-        *chosen
+        if stopped {
+            chosen.ended_by(Termination::Stopped)
+        } else {
+            *chosen
+        }
     }
 }
 
