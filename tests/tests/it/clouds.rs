@@ -556,7 +556,7 @@ fn points_without_a_normal_hide_no_open_direction() {
     let kind = Registration::PointToPoint;
     let options = CloudOptions::default();
     let source = options.for_source_of(kind).cloud(&source, None).unwrap();
-    let mut align = |points: &[Point3<f32>]| {
+    let align = |points: &[Point3<f32>]| {
         let target = options.target_of(kind, points, None).unwrap();
         assert_eq!(target.n_skipped(), 0);
         align(

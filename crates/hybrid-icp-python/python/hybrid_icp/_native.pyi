@@ -763,7 +763,7 @@ class Pipeline:
         observer : callable or object, optional
             A callable receives an `IterationEvent` per iteration. An object can have any of the
             methods `on_iteration`, `on_regime`, `on_decision` and `on_stage_end`. If one of them
-            returns `False`, the run stops at the pose last evaluated. An exception stops the run
+            returns `False`, the run stops at the last accepted pose. An exception stops the run
             and is raised again.
 
         Returns
@@ -1246,7 +1246,8 @@ def align(source: _Points, target: _Points, T_ts: npt.ArrayLike | None=None, *, 
         The rough pose, target from source, meters. The default is the identity. A translation
         above 100 m is probably in millimeters, and causes a warning.
     source_normals, target_normals : array_like, shape (N, 3), float32, optional
-        One normal per point, of any length above 0. Points whose normal is zero are skipped.
+        One normal per point, of any length above 0. Points whose normal is zero are skipped, except
+        for targets of "point-to-point".
     method : {"point-to-plane", "point-to-point", "gicp"}, optional
         The error to minimize.
     max_distance : float, optional
