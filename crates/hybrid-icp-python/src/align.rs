@@ -93,13 +93,15 @@ pub(crate) fn align<'py>(
     let limit = CloudWarning::of_length("max_distance", max_distance, side, &target.points);
     lengths.extend(limit);
     let alignment = py.detach(|| -> PyResult<_> {
+        // Normals of large clouds take seconds.
+        let interrupted = || Python::attach(|py| py.check_signals());
         let of_source = options.for_source_of(method);
         let source = of_source.cloud(&source.points, source.normals.as_deref());
+        let source = source.map_err(errors::input)?;
+        interrupted()?;
         let target = options.target_of(method, &target.points, target.normals.as_deref());
-        let (source, target) = (
-            source.map_err(errors::input)?,
-            target.map_err(errors::input)?,
-        );
+        let target = target.map_err(errors::input)?;
+        interrupted()?;
         let mut pipeline = method.build(max_distance);
         let mut signals = Signals(Ok(()));
         let mut workspace = Workspace::new(Rasterizer::default());
