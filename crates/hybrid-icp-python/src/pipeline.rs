@@ -422,12 +422,15 @@ impl PyPipeline {
         model: &Bound<'py, PyModel>,
         observation: &Bound<'_, PyObservation>,
         T_co: &Bound<'_, PyAny>,
-        threads: Option<usize>,
+        threads: Option<i64>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let inits = array::motions(T_co, "T_co", EXPECTED_POSES, 1.0)?;
         let threads = match threads {
-            Some(0) => return Err(InputError::new_err("threads is 0, expected 1 or more")),
-            Some(threads) => threads,
+            Some(threads @ 1..) => usize::try_from(threads).unwrap_or(usize::MAX),
+            Some(threads) => {
+                let text = format!("threads is {threads}, expected 1 or more");
+                return Err(InputError::new_err(text));
+            }
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
         let (object, observation) = (model.get(), observation.get());
@@ -478,7 +481,7 @@ impl PyPipeline {
     fn refine_many<'py>(
         slf: &Bound<'py, Self>,
         items: &Bound<'py, PyAny>,
-        threads: Option<usize>,
+        threads: Option<i64>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("hybrid_icp._many")?;
         module.call_method1("refine", (slf, items, threads))

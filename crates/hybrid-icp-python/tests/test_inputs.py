@@ -99,8 +99,9 @@ def test_a_batch_names_the_pose_that_is_wrong(scene):
         hybrid.refine_batch(scene.model, scene.observation, poses)
     with pytest.raises(hi.InputError, match=r"shape \(4, 4\), expected an \(N, 4, 4\)"):
         hybrid.refine_batch(scene.model, scene.observation, scene.rough)
-    with pytest.raises(hi.InputError, match="threads is 0"):
-        hybrid.refine_batch(scene.model, scene.observation, poses[:1], threads=0)
+    for threads in (0, -1):
+        with pytest.raises(hi.InputError, match=f"threads is {threads}, expected 1 or more"):
+            hybrid.refine_batch(scene.model, scene.observation, poses[:1], threads=threads)
 
 
 def test_frames_and_units_that_do_not_match_cause_a_warning(scene):
