@@ -4,8 +4,10 @@ import copy
 import json
 import math
 import pickle
+import shutil
 import subprocess
 import sys
+import warnings
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -240,7 +242,7 @@ def test_an_equivalent_pose_is_near_the_reference(scene):
         assert np.allclose(found, result.T_co @ turn, atol=1e-9)
 
 
-def test_models_of_a_dataset_have_their_symmetries(dataset):
+def test_models_of_a_dataset_have_their_symmetries(dataset, tmp_path):
     folder = dataset[0]
     numbers = [int(path.stem[4:]) for path in (folder / "models").glob("obj_*.ply")]
     models = [hi.Model.from_bop(folder, number) for number in numbers]
@@ -249,6 +251,17 @@ def test_models_of_a_dataset_have_their_symmetries(dataset):
     assert np.array_equal(same.vertices, models[0].vertices)
     with pytest.raises(hi.FileError, match="no model of object 999"):
         hi.Model.from_bop(folder, 999)
+    # A folder of other meshes has no models_info.json of its own.
+    mesh = next((folder / "models").glob("obj_*.ply"))
+    for name in ("models", "models_color"):
+        (tmp_path / name).mkdir()
+        shutil.copy(mesh, tmp_path / name)
+    info = {int(mesh.stem[4:]): {"diameter": 321.0, "symmetries_discrete": []}}
+    (tmp_path / "models" / "models_info.json").write_text(json.dumps(info))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", hi.InputWarning)
+        found = hi.Model.from_bop(tmp_path / "models_color", int(mesh.stem[4:]))
+    assert found.diameter == pytest.approx(0.321)
 
 
 class Mesh:

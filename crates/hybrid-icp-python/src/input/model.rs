@@ -112,13 +112,7 @@ impl PyModel {
         colors: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let options = Options::new(unit, samples, diameter, symmetries, symmetry_axes)?;
-        let mut mesh = mesh(vertices, faces, options.unit)?;
-        if let Some(colors) = colors {
-            mesh = mesh
-                .with_color(color::surface(colors)?)
-                .map_err(errors::input)?;
-        }
-        options.model(py, mesh)
+        options.model_of_arrays(py, [vertices, faces], colors)
     }
 
     /// Reads a mesh and its colors from a GLB, glTF, OBJ, OFF, PLY or STL file.
@@ -219,13 +213,13 @@ impl PyModel {
     /// Model
     #[staticmethod]
     #[pyo3(signature = (mesh, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Axes::default()))]
-    fn from_trimesh(
-        py: Python<'_>,
-        mesh: &Bound<'_, PyAny>,
+    fn from_trimesh<'py>(
+        py: Python<'py>,
+        mesh: &Bound<'py, PyAny>,
         unit: &str,
         samples: usize,
         diameter: Option<f64>,
-        symmetries: Option<&Bound<'_, PyAny>>,
+        symmetries: Option<&Bound<'py, PyAny>>,
         symmetry_axes: Axes,
     ) -> PyResult<Self> {
         let is_scene = !mesh.hasattr("vertices")? && mesh.hasattr("to_mesh")?;
@@ -233,22 +227,8 @@ impl PyModel {
             true => &mesh.call_method0("to_mesh")?,
             false => mesh,
         };
-        let (vertices, faces) = (mesh.getattr("vertices")?, mesh.getattr("faces")?);
-        let (vertices, faces) = (&vertices, &faces);
-        let module = py.import("hybrid_icp._colors")?;
-        let colors = module.call_method1("of_trimesh", (mesh,))?;
-        let colors = (!colors.is_none()).then_some(colors);
-        Self::new(
-            py,
-            vertices,
-            faces,
-            unit,
-            samples,
-            diameter,
-            symmetries,
-            symmetry_axes,
-            colors.as_ref(),
-        )
+        let options = Options::new(unit, samples, diameter, symmetries, symmetry_axes)?;
+        options.model_of_mesh(py, mesh, ("faces", "of_trimesh"))
     }
 
     /// Creates a model from a triangle mesh of Open3D.
@@ -268,29 +248,17 @@ impl PyModel {
     /// Model
     #[staticmethod]
     #[pyo3(signature = (mesh, *, unit, samples = 1000, diameter = None, symmetries = None, symmetry_axes = Axes::default()))]
-    fn from_open3d(
-        py: Python<'_>,
-        mesh: &Bound<'_, PyAny>,
+    fn from_open3d<'py>(
+        py: Python<'py>,
+        mesh: &Bound<'py, PyAny>,
         unit: &str,
         samples: usize,
         diameter: Option<f64>,
-        symmetries: Option<&Bound<'_, PyAny>>,
+        symmetries: Option<&Bound<'py, PyAny>>,
         symmetry_axes: Axes,
     ) -> PyResult<Self> {
-        let module = py.import("hybrid_icp._colors")?;
-        let colors = module.call_method1("of_open3d", (mesh,))?;
-        let colors = (!colors.is_none()).then_some(colors);
-        Self::new(
-            py,
-            &mesh.getattr("vertices")?,
-            &mesh.getattr("triangles")?,
-            unit,
-            samples,
-            diameter,
-            symmetries,
-            symmetry_axes,
-            colors.as_ref(),
-        )
+        let options = Options::new(unit, samples, diameter, symmetries, symmetry_axes)?;
+        options.model_of_mesh(py, mesh, ("triangles", "of_open3d"))
     }
 
     /// Returns the pose that is equivalent by a declared symmetry and nearest to another pose.
@@ -434,6 +402,39 @@ impl<'a, 'py> Options<'a, 'py> {
             symmetries,
             axes,
         })
+    }
+
+    /// Creates a model from a mesh of another library, given the attribute of its faces and the
+    /// function that reads its colors.
+    fn model_of_mesh(
+        self,
+        py: Python<'py>,
+        mesh: &Bound<'py, PyAny>,
+        (faces, colors): (&str, &str),
+    ) -> PyResult<PyModel> {
+        let module = py.import("hybrid_icp._colors")?;
+        let colors = module.call_method1(colors, (mesh,))?;
+        let (vertices, faces) = (mesh.getattr("vertices")?, mesh.getattr(faces)?);
+        self.model_of_arrays(
+            py,
+            [&vertices, &faces],
+            Some(&colors).filter(|c| !c.is_none()),
+        )
+    }
+
+    fn model_of_arrays(
+        self,
+        py: Python<'_>,
+        [vertices, faces]: [&Bound<'_, PyAny>; 2],
+        colors: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<PyModel> {
+        let mut mesh = mesh(vertices, faces, self.unit)?;
+        if let Some(colors) = colors {
+            mesh = mesh
+                .with_color(color::surface(colors)?)
+                .map_err(errors::input)?;
+        }
+        self.model(py, mesh)
     }
 
     fn model(self, py: Python<'_>, mesh: TriMesh) -> PyResult<PyModel> {
