@@ -55,7 +55,7 @@ impl Cloud {
     /// Creates a cloud in which points without a normal have one of NaN, for a metric that does not
     /// use normals.
     ///
-    /// Skips other points as [`Cloud::new`] does.
+    /// Skips points that are not finite, or beyond [`MAX_COORDINATE_METERS`].
     pub fn with_some_normals(surfels: impl IntoIterator<Item = Surfel>) -> Self {
         Self::of(surfels, |_| true)
     }

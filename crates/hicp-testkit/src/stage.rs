@@ -69,7 +69,7 @@ pub fn check_stage<T: Stage + 'static>(make: impl Fn() -> T, laws: StageLaws) {
             let law = "if nothing is observed, the initial pose is returned bit for bit";
             trial.same(law, init, &outcome.camera_from_object);
         }
-        for at in [1, 2, reported.len()] {
+        for at in [1, 2, reported.len().max(1)] {
             let mut stopper = Stopper { at, calls: 0 };
             let stopped = trial.calm(|| run(&mut make(), &mut workspace(), &case, &mut stopper));
             finite(&trial, init, &stopped);
@@ -78,7 +78,7 @@ pub fn check_stage<T: Stage + 'static>(make: impl Fn() -> T, laws: StageLaws) {
                 calls => calls == at && stopped.termination == Termination::Stopped,
             };
             let law = "a stage that the observer stops ends as `Stopped`, and runs nothing else";
-            trial.holds(law, at == 0 || ended, format_args!("{stopped:?}"));
+            trial.holds(law, ended, format_args!("{stopped:?}"));
         }
     }
 }

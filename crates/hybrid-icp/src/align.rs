@@ -90,7 +90,7 @@ impl CloudOptions {
             Registration::PointToPoint => Cloud::with_some_normals,
             _ => Cloud::new,
         };
-        self.create(points, normals, create)
+        self.prepared(points, normals, create)
     }
 
     /// Creates a cloud from points in meters, with unit normals if there are any.
@@ -106,10 +106,11 @@ impl CloudOptions {
         points: &[Point3<f32>],
         normals: Option<&[UnitVector3<f32>]>,
     ) -> Result<Cloud, NormalCount> {
-        self.create(points, normals, Cloud::new)
+        self.prepared(points, normals, Cloud::new)
     }
 
-    fn create(
+    /// Prepares points and normals, and creates a cloud of them with a constructor.
+    fn prepared(
         &self,
         points: &[Point3<f32>],
         normals: Option<&[UnitVector3<f32>]>,

@@ -119,9 +119,10 @@ impl<S: Stage, C: Score> Stage for KeepBest<S, C> {
             iterations: last.iterations,
             ..best.1
         };
-        match last.termination {
-            reason @ Termination::Stopped => best.ended_by(reason),
-            _ => best,
+        if last.termination == Termination::Stopped {
+            best.ended_by(Termination::Stopped)
+        } else {
+            best
         }
     }
 

@@ -181,8 +181,8 @@ fn text(faults: &[Named], score: f64) -> String {
         let judged = match score {
             good if good < 0.3 => "the model at the pose explains the image",
             _ => {
-                "but the model at the pose does not explain the image: it may be another model, or \
-                 the mask of another object. Check --overlay of refine"
+                "the model at the pose does not explain the image. It may be another model, or the \
+                 mask of another object: check --overlay of refine"
             }
         };
         return format!("no fault found (score {score:.3}): {judged}");
