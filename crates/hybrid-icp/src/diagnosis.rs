@@ -117,7 +117,7 @@ impl Diagnosis {
             score, mve, flat, ..
         } = judge.refined(&inputs);
         let mut trials = Vec::new();
-        for (fault, inputs) in hypotheses::ALL.iter().flat_map(|of| of(&inputs)) {
+        for (fault, inputs) in hypotheses::all(&inputs) {
             trials.push((judge.initial(&inputs), fault, inputs));
         }
         trials.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -5,40 +5,43 @@ use std::ops::RangeInclusive;
 
 use hicp_core::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::fault::Fault;
+use super::fault::{Fault, is_measured};
 use super::images::{
     depth_reversed, depth_shifted, mask_inverted, mask_shifted, mask_too_large, mirrored,
     ray_distance,
 };
-use super::inputs::Inputs;
+use super::inputs::{Corrected, Inputs};
 use super::scales::{
     DECIMAL, depth_scale, focal_length, intrinsics, mesh_scale, mesh_size, translation_scale,
 };
 
-/// The possible faults of some inputs, each with the corrected inputs.
-type Hypothesis = for<'a> fn(&Inputs<'a>) -> Vec<(Fault, Inputs<'a>)>;
-
 /// Distances between two origins of a model that are a fault, in diameters.
 const ELSEWHERE: RangeInclusive<f64> = 0.25..=3.0;
 
-/// All hypotheses.
-pub(super) const ALL: [Hypothesis; 15] = [
-    mesh_scale,
-    mesh_size,
-    depth_scale,
-    translation_scale,
-    pose_convention,
-    origin,
-    intrinsics,
-    focal_length,
-    mask_inverted,
-    ray_distance,
-    mirrored,
-    depth_reversed,
-    depth_shifted,
-    mask_shifted,
-    mask_too_large,
-];
+/// Returns all possible faults of some inputs, each with the corrected inputs.
+pub(super) fn all<'a>(inputs: &Inputs<'a>) -> impl Iterator<Item = Corrected<'a>> {
+    let several: [for<'i> fn(&Inputs<'i>) -> Vec<Corrected<'i>>; 5] = [
+        mesh_scale,
+        pose_convention,
+        intrinsics,
+        mirrored,
+        depth_reversed,
+    ];
+    let one: [for<'i> fn(&Inputs<'i>) -> Option<Corrected<'i>>; 10] = [
+        mesh_size,
+        depth_scale,
+        translation_scale,
+        origin,
+        focal_length,
+        mask_inverted,
+        ray_distance,
+        depth_shifted,
+        mask_shifted,
+        mask_too_large,
+    ];
+    let several = several.into_iter().flat_map(|of| of(inputs));
+    several.chain(one.into_iter().filter_map(|of| of(inputs)))
+}
 
 /// Returns the improvement of the score that counts as none.
 ///
@@ -51,7 +54,7 @@ pub(super) fn handicap(fault: &Fault) -> f64 {
         Fault::MaskTooLarge { .. } | Fault::PlaneInMask { .. } => 0.06,
         // The mask of another object at another place is also explained a little.
         Fault::Origin { .. } => 0.2,
-        Fault::MeshScale { factor } if (0.5..=2.0).contains(factor) => 0.03,
+        Fault::MeshScale { factor } if is_measured(*factor) => 0.03,
         Fault::MeshScale { factor } if !DECIMAL.contains(factor) => 0.05,
         Fault::FocalLength { .. } => 0.05,
         Fault::Disparity { product } if product.log10().fract() != 0.0 => 0.1,
@@ -59,7 +62,7 @@ pub(super) fn handicap(fault: &Fault) -> f64 {
     }
 }
 
-fn pose_convention<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+fn pose_convention<'a>(inputs: &Inputs<'a>) -> Vec<Corrected<'a>> {
     let init = &inputs.init;
     let transposed = Isometry3::from_parts(init.translation, init.rotation.inverse());
     let opengl = Isometry3::rotation(PI * Vector3::x()) * init;
@@ -82,23 +85,17 @@ fn pose_convention<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
 }
 
 /// Moves the model so that the middle of its visible surface is that of the measured one.
-fn origin<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
-    let Some(measured) = inputs.middle(&inputs.depth, |i| inputs.mask.pixels()[i]) else {
-        return Vec::new();
-    };
+fn origin<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
+    let measured = inputs.middle(&inputs.depth, |i| inputs.mask.pixels()[i])?;
     let moved = |inputs: &Inputs<'a>, shift: Vector3<f64>| {
         inputs.with_init(Translation3::from(shift) * inputs.init)
     };
     let centered = moved(inputs, measured - inputs.init * inputs.model.center());
-    let Some(rendered) = centered.middle(&centered.rendered(), |_| true) else {
-        return Vec::new();
-    };
+    let rendered = centered.middle(&centered.rendered(), |_| true)?;
     let found = moved(&centered, measured - rendered);
     let shift = inputs.init.rotation.inverse()
         * (found.init.translation.vector - inputs.init.translation.vector);
     let shift_meters = shift.into();
-    match ELSEWHERE.contains(&(shift.norm() / inputs.model.diameter())) {
-        true => vec![(Fault::Origin { shift_meters }, found)],
-        false => Vec::new(),
-    }
+    let is_elsewhere = ELSEWHERE.contains(&(shift.norm() / inputs.model.diameter()));
+    is_elsewhere.then_some((Fault::Origin { shift_meters }, found))
 }

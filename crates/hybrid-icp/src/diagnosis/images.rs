@@ -1,7 +1,7 @@
 //! Hypotheses about the depth image, the mask and their alignment.
 
 use super::fault::Fault;
-use super::inputs::{Inputs, decimal, nearest};
+use super::inputs::{Corrected, Inputs, decimal, nearest};
 
 /// Smallest difference between distance and depth that exceeds the errors of poses, meters.
 const LEAST_RAY_SHIFT: f64 = 0.01;
@@ -10,19 +10,15 @@ const MAX_SHIFT: i64 = 10;
 /// Smallest shift that is a fault, pixels.
 const MIN_SHIFT: i64 = 4;
 
-pub(super) fn ray_distance<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn ray_distance<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
     let ratio = |u: u32, v: u32| inputs.camera.distance_per_depth(u.into(), v.into());
     let changed = inputs.with_depth(|u, v, z| z / ratio(u, v));
     let middle = |inputs: &Inputs<'_>| inputs.median(|_, measured| measured);
-    match middle(inputs).zip(middle(&changed)) {
-        Some((before, after)) if before - after > LEAST_RAY_SHIFT => {
-            vec![(Fault::RayDistance, changed)]
-        }
-        _ => Vec::new(),
-    }
+    let shift = middle(inputs)? - middle(&changed)?;
+    (shift > LEAST_RAY_SHIFT).then_some((Fault::RayDistance, changed))
 }
 
-pub(super) fn mirrored<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn mirrored<'a>(inputs: &Inputs<'a>) -> Vec<Corrected<'a>> {
     let last = [inputs.depth.width(), inputs.depth.height()].map(|side| i64::from(side) - 1);
     let mirrored = |(horizontally, vertically)| {
         let from = |u, v| {
@@ -45,7 +41,7 @@ pub(super) fn mirrored<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
 /// Near surfaces have large values: a constant minus the depth, or divided by the depth.
 ///
 /// Within a small object, the two are nearly the same. A power of ten decides for the division.
-pub(super) fn depth_reversed<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn depth_reversed<'a>(inputs: &Inputs<'a>) -> Vec<Corrected<'a>> {
     let sum = inputs.median(|rendered, measured| rendered + measured);
     let product = inputs.median(|rendered, measured| rendered * measured);
     let (Some(sum), Some(product)) = (sum, product) else {
@@ -75,7 +71,7 @@ pub(super) fn depth_reversed<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)
 }
 
 /// Shifts the depth to the model at the initial pose.
-pub(super) fn depth_shifted<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn depth_shifted<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
     let rendered = inputs.rendered();
     let width = i64::from(rendered.width());
     let pixels = (0_i64..).zip(rendered.pixels().iter().zip(inputs.mask.pixels()));
@@ -106,7 +102,7 @@ pub(super) fn depth_shifted<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)>
 }
 
 /// Shifts the mask to the pixels at which the model at the initial pose agrees with the depth.
-pub(super) fn mask_shifted<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn mask_shifted<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
     let rendered = inputs.rendered();
     let (width, near) = (rendered.width() as usize, 0.2 * inputs.model.diameter());
     let center = |holds: &dyn Fn(usize) -> bool| {
@@ -124,10 +120,7 @@ pub(super) fn mask_shifted<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> 
         let (z, measured) = (rendered.pixels()[i], inputs.depth.pixels()[i]);
         z > 0.0 && measured > 0.0 && f64::from(z - measured).abs() < near
     };
-    let centers = center(&agrees).zip(center(&|i| inputs.mask.pixels()[i]));
-    let Some((seen, masked)) = centers else {
-        return Vec::new();
-    };
+    let (seen, masked) = (center(&agrees)?, center(&|i| inputs.mask.pixels()[i])?);
     #[allow(clippy::cast_possible_truncation)] // Within the image.
     let [right, down] = [0, 1].map(|axis| (seen[axis] - masked[axis]).round() as i64);
     shifted(right, down, || {
@@ -135,20 +128,17 @@ pub(super) fn mask_shifted<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> 
     })
 }
 
-fn shifted<'a>(right: i64, down: i64, of: impl Fn() -> Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+fn shifted<'a>(right: i64, down: i64, of: impl Fn() -> Inputs<'a>) -> Option<Corrected<'a>> {
     let fault = Fault::Misaligned { right, down };
-    match right.abs().max(down.abs()) {
-        MIN_SHIFT.. => vec![(fault, of())],
-        _ => Vec::new(),
-    }
+    (right.abs().max(down.abs()) >= MIN_SHIFT).then(|| (fault, of()))
 }
 
-pub(super) fn mask_inverted<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
-    vec![(Fault::MaskInverted, inputs.with_mask(|_, _, set| !set))]
+pub(super) fn mask_inverted<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
+    Some((Fault::MaskInverted, inputs.with_mask(|_, _, set| !set)))
 }
 
 /// Keeps the part of the mask that the model explains at the initial pose.
-pub(super) fn mask_too_large<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn mask_too_large<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
     let center = inputs.init * inputs.model.center();
     let radius = 1.1 * inputs.model.radius();
     let in_sphere = inputs.with_mask(|u, v, set| {
@@ -170,11 +160,9 @@ pub(super) fn mask_too_large<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)
     });
     let lost = |after: &Inputs<'_>| 1.0 - after.n_masked() as f64 / inputs.n_masked().max(1) as f64;
     let (outside, share) = (lost(&in_sphere), lost(&explained));
-    if outside > 0.2 {
-        vec![(Fault::MaskTooLarge { outside }, explained)]
-    } else if share > 0.15 {
-        vec![(Fault::PlaneInMask { share }, explained)]
-    } else {
-        Vec::new()
-    }
+    let fault = match outside > 0.2 {
+        true => Fault::MaskTooLarge { outside },
+        false => Fault::PlaneInMask { share },
+    };
+    (outside > 0.2 || share > 0.15).then_some((fault, explained))
 }

@@ -9,6 +9,11 @@ use hicp_core::{
 };
 use hicp_raster::render_depth_image;
 
+use super::fault::Fault;
+
+/// A possible fault, and the inputs without it.
+pub(super) type Corrected<'a> = (Fault, Inputs<'a>);
+
 /// A model, an image and an initial pose; all of them can be replaced.
 #[derive(Clone)]
 pub(super) struct Inputs<'a> {

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use hicp_core::{Model, ModelConfig, PinholeCamera, TriMesh};
 
 use super::fault::Fault;
-use super::inputs::{Inputs, decimal, median, nearest};
+use super::inputs::{Corrected, Inputs, decimal, median, nearest};
 
 /// Factors between decimal units of meshes.
 pub(super) const DECIMAL: [f64; 6] = [1e-3, 1e-2, 0.1, 10.0, 100.0, 1000.0];
@@ -30,7 +30,7 @@ const STEPS: i32 = 14;
 /// Mantissas of usual depth scales.
 const MANTISSAS: [f64; 6] = [1.0, 2.0, 2.5, 4.0, 5.0, 8.0];
 
-pub(super) fn mesh_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn mesh_scale<'a>(inputs: &Inputs<'a>) -> Vec<Corrected<'a>> {
     let model = &inputs.model;
     let angle = (inputs.n_masked() as f64).sqrt() / inputs.camera.fx();
     // The camera is outside of the bounding sphere, and the mask fits the diameter.
@@ -46,7 +46,7 @@ pub(super) fn mesh_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
 }
 
 /// Returns the inputs with the mesh times a factor.
-fn with_mesh<'a>(inputs: &Inputs<'a>, factor: f64) -> Option<(Fault, Inputs<'a>)> {
+fn with_mesh<'a>(inputs: &Inputs<'a>, factor: f64) -> Option<Corrected<'a>> {
     let model = &inputs.model;
     let vertices = model.mesh().vertices().iter();
     #[allow(clippy::cast_possible_truncation)] // f32 is the precision of buffers.
@@ -65,11 +65,10 @@ fn with_mesh<'a>(inputs: &Inputs<'a>, factor: f64) -> Option<(Fault, Inputs<'a>)
 }
 
 /// With the right size, the model covers the mask best.
-pub(super) fn mesh_size<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn mesh_size<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
     // The silhouette of a larger object is that of a nearer one.
     let overlap = |factor: f64| Some(inputs.with_scaled_translation(1.0 / factor).overlap());
-    let found = best_factor(overlap).and_then(|factor| with_mesh(inputs, factor));
-    found.into_iter().collect()
+    with_mesh(inputs, best_factor(overlap)?)
 }
 
 /// Returns the factor with the best score, if it is not 1 or nearly so.
@@ -80,33 +79,24 @@ fn best_factor(score: impl Fn(f64) -> Option<f64>) -> Option<f64> {
     (best.ln().abs() > 1.5 * STEP.ln()).then_some(best)
 }
 
-pub(super) fn depth_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
-    let ratio = inputs.median(|rendered, measured| rendered / measured);
-    let factor = ratio.and_then(|ratio| nearest(ratio, decimal(&MANTISSAS), 0.1));
-    let factor = factor.filter(|factor| !(0.6..1.6).contains(factor));
-    let scaled = |factor| {
-        let inputs = inputs.with_depth(|_, _, z| factor * z);
-        (Fault::DepthScale { factor }, inputs)
-    };
-    factor.map(scaled).into_iter().collect()
+pub(super) fn depth_scale<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
+    let ratio = inputs.median(|rendered, measured| rendered / measured)?;
+    let factor = nearest(ratio, decimal(&MANTISSAS), 0.1)?;
+    let scaled = || inputs.with_depth(|_, _, z| factor * z);
+    (!(0.6..1.6).contains(&factor)).then(|| (Fault::DepthScale { factor }, scaled()))
 }
 
-pub(super) fn translation_scale<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn translation_scale<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
     let pixels = inputs.depth.pixels().iter().zip(inputs.mask.pixels());
     let depths = pixels.filter(|(z, set)| **set && **z > 0.0);
-    let middle = median(depths.map(|(z, _)| f64::from(*z)));
-    let ratio = middle.map(|middle| middle / inputs.init.translation.z);
-    let factor = ratio.and_then(|ratio| nearest(ratio, decimal(&[1.0]), 0.8));
-    let factor = factor.filter(|factor| *factor != 1.0);
-    let scaled = |factor| {
-        let inputs = inputs.with_scaled_translation(factor);
-        (Fault::TranslationScale { factor }, inputs)
-    };
-    factor.map(scaled).into_iter().collect()
+    let ratio = median(depths.map(|(z, _)| f64::from(*z)))? / inputs.init.translation.z;
+    let factor = nearest(ratio, decimal(&[1.0]), 0.8)?;
+    let scaled = || inputs.with_scaled_translation(factor);
+    (factor != 1.0).then(|| (Fault::TranslationScale { factor }, scaled()))
 }
 
 /// With the right focal lengths, the model covers the mask best.
-pub(super) fn focal_length<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn focal_length<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
     let old = inputs.camera;
     let scaled = |factor: f64| {
         let (fx, fy) = (old.fx() * factor, old.fy() * factor);
@@ -117,16 +107,15 @@ pub(super) fn focal_length<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> 
             ..inputs.clone()
         })
     };
-    let best = best_factor(|factor| Some(scaled(factor)?.overlap()));
-    let found = best.and_then(|factor| Some((Fault::FocalLength { factor }, scaled(factor)?)));
-    found.into_iter().collect()
+    let factor = best_factor(|factor| Some(scaled(factor)?.overlap()))?;
+    Some((Fault::FocalLength { factor }, scaled(factor)?))
 }
 
 /// The principal point is near the middle of the image that the intrinsics belong to.
 ///
 /// The images of another resolution are scaled by axis, or cropped on two sides. The numbers of
 /// this image may be in another order.
-pub(super) fn intrinsics<'a>(inputs: &Inputs<'a>) -> Vec<(Fault, Inputs<'a>)> {
+pub(super) fn intrinsics<'a>(inputs: &Inputs<'a>) -> Vec<Corrected<'a>> {
     let old = inputs.camera;
     let (width, height) = (f64::from(old.width()), f64::from(old.height()));
     let [fx, fy, cx, cy] = [old.fx(), old.fy(), old.cx(), old.cy()];
