@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::icp::Alternative;
 use hybrid_icp::pipeline::PipelineFile;
-use hybrid_icp::{Preset, Refinement, Refiner, Trace};
+use hybrid_icp::{Preset, Refinement, Refiner, Trace, checks::median_depth};
 use pyo3::prelude::*;
 
 use crate::array::{self, Motion};
@@ -342,7 +342,7 @@ impl PyPipeline {
         let (object, observation) = (model.get(), observation.get());
         let colors = self.colors || observation.observation.color().is_some();
         // Without depth, any distance in front of the camera will do.
-        let distance = observation.median_depth.unwrap_or(1.0);
+        let distance = median_depth(&observation.observation).unwrap_or(1.0);
         self.warn(py, object, observation, &[distance], colors)?;
         let (seen, mut trace) = (&observation.observation, Trace::new());
         let (refinement, others) = self.run(py, |refiner| {

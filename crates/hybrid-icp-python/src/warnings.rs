@@ -28,12 +28,11 @@ pub(crate) fn about_inputs(
         let text = format!("{missing}, so that {pipeline} uses depth alone");
         errors::warn(py, &text)?;
     }
-    if observation.pixels == 0 {
+    if image.region().is_empty() {
         let text = "the mask is empty, expected pixels that are not 0 on the object";
         errors::warn(py, text)?;
     }
-    let (pixels, median) = (observation.pixels, observation.median_depth);
-    let at = |distance: &f64| warnings_of_image(model, image, *distance, pixels, median);
+    let at = |distance: &f64| warnings_of_image(model, image, *distance);
     if distances.iter().any(|distance| at(distance).is_empty()) {
         return Ok(());
     }

@@ -1,8 +1,9 @@
 //! Checks of inputs and results, each of which is well-formed by itself.
 
 use std::f64::consts::FRAC_PI_4;
+use std::sync::Arc;
 
-use hicp_core::internal::bounds;
+use hicp_core::internal::{bounds, median};
 use hicp_core::{Isometry3, Model, Observation, PinholeCamera, diameter, se3};
 use hicp_icp::Alternative;
 use hicp_score::Flatness;
@@ -90,9 +91,8 @@ pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>)
     } else {
         f64::NAN
     };
-    let (pixels, median) = inside_mask(observation);
     let mut warnings = warnings_of_model(model);
-    let mut of_image = warnings_of_image(model, observation, distance, pixels, median);
+    let mut of_image = warnings_of_image(model, observation, distance);
     if !warnings.is_empty() {
         // One warning about the same numbers is enough.
         let size = |w: &Warning| matches!(w, Warning::Mask { .. } | Warning::Sliver { .. });
@@ -102,20 +102,17 @@ pub fn warnings(model: &Model, observation: &Observation, init: &Isometry3<f64>)
     warnings
 }
 
-/// Returns the [`warnings`] that depend on an image, for callers that know more of it.
+/// Returns the [`warnings`] that depend on an image.
 ///
-/// `distance` is z of the object's center in the camera frame, meters. `pixels` is the number of
-/// pixels of the mask, and `median_depth` their median depth in meters. Cost: O(1), and
-/// O(vertices) if the mask is small for the object.
+/// `distance` is z of the object's center in the camera frame, meters. Cost: O(pixels of the mask's
+/// box) for the first time, then O(1), and O(vertices) if the mask is small for the object.
 #[must_use]
-pub fn warnings_of_image(
-    model: &Model,
-    observation: &Observation,
-    distance: f64,
-    pixels: usize,
-    median_depth: Option<f64>,
-) -> Vec<Warning> {
+pub fn warnings_of_image(model: &Model, observation: &Observation, distance: f64) -> Vec<Warning> {
     let camera = observation.camera();
+    let Inside {
+        pixels,
+        median_depth,
+    } = *Inside::of(observation);
     let is_crop = |warning: &Warning| match (warning, median_depth) {
         (Warning::Center { fault, .. }, Some(depth)) => {
             was_cropped(model, observation, depth, *fault)
@@ -407,23 +404,35 @@ fn touches_border(observation: &Observation) -> bool {
         || region.v_max == camera.height()
 }
 
-/// Returns the number of pixels of the mask and the median of their measured depths in meters.
-fn inside_mask(observation: &Observation) -> (usize, Option<f64>) {
-    let width = observation.camera().width() as usize;
-    let region = observation.region();
-    let columns = region.u_min as usize..region.u_max as usize;
-    let mut pixels = 0;
-    let mut inside: Vec<f32> = Vec::new();
-    for v in region.v_min as usize..region.v_max as usize {
-        let row = v * width + columns.start..v * width + columns.end;
-        let depth = &observation.depth().pixels()[row.clone()];
-        let mask = &observation.mask().pixels()[row];
-        for (z, _) in depth.iter().zip(mask).filter(|(_, set)| **set) {
-            pixels += 1;
-            inside.extend(Some(*z).filter(|z| *z > 0.0));
-        }
+/// Returns the median of the depths measured inside the mask, meters.
+///
+/// Returns `None` if nothing was measured there. Cost: O(pixels of the mask's box), once per
+/// observation.
+#[must_use]
+pub fn median_depth(observation: &Observation) -> Option<f64> {
+    Inside::of(observation).median_depth
+}
+
+/// The pixels inside the mask of an observation.
+struct Inside {
+    /// Number of pixels.
+    pixels: usize,
+    /// Median of the measured depths, meters.
+    median_depth: Option<f64>,
+}
+
+impl Inside {
+    fn of(observation: &Observation) -> Arc<Self> {
+        let (depth, mask) = (observation.depth(), observation.mask());
+        observation.derived().get_or_build(0, || {
+            let masked = observation.region().pixels();
+            let masked = masked.filter(|(u, v)| mask.get(*u, *v) == Some(true));
+            let depths: Vec<f32> = masked.filter_map(|(u, v)| depth.get(u, v)).collect();
+            let mut measured = Vec::from_iter(depths.iter().copied().filter(|z| *z > 0.0));
+            Self {
+                pixels: depths.len(),
+                median_depth: median(&mut measured, f32::total_cmp).map(f64::from),
+            }
+        })
     }
-    inside.sort_by(f32::total_cmp);
-    let median = inside.get(inside.len() / 2).copied();
-    (pixels, median.map(f64::from))
 }

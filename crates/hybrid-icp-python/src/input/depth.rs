@@ -302,14 +302,9 @@ fn warn_of_labels(value: &Bound<'_, PyAny>, mask: &ArrayView2<'_, u8>) -> PyResu
 }
 
 /// Returns the median of the positive depths, or `None` if there are none.
-pub(crate) fn median(depths: impl Iterator<Item = f32>) -> Option<f32> {
+fn median(depths: impl Iterator<Item = f32>) -> Option<f32> {
     let mut positive: Vec<f32> = depths.filter(|z| *z > 0.0).collect();
     internal::median(&mut positive, f32::total_cmp)
-}
-
-/// Returns the strides that visit at most 64 × 64 pixels of an area.
-pub(crate) fn strides(height: usize, width: usize) -> (usize, usize) {
-    (height.div_ceil(GRID).max(1), width.div_ceil(GRID).max(1))
 }
 
 /// Returns an image that Python receives as an array of shape (H, W).
@@ -375,7 +370,8 @@ fn check_unit<T: Copy>(
     meters: impl Fn(T) -> f32 + Copy,
     advice: &str,
 ) -> PyResult<()> {
-    let (down, right) = strides(array.nrows(), array.ncols());
+    let stride = |side: usize| side.div_ceil(GRID).max(1);
+    let (down, right) = (stride(array.nrows()), stride(array.ncols()));
     let rows = (down / 2..array.nrows()).step_by(down);
     let grid = rows.flat_map(|v| {
         let columns = (right / 2..array.ncols()).step_by(right);

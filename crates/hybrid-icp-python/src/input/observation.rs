@@ -153,10 +153,6 @@ pub(crate) fn mask_in_box(
 #[derive(Debug)]
 pub(crate) struct PyObservation {
     pub(crate) observation: Observation,
-    /// Number of pixels of the mask.
-    pub(crate) pixels: usize,
-    /// Median depth inside the mask, meters; `None` if no masked pixel was measured.
-    pub(crate) median_depth: Option<f64>,
 }
 
 #[pymethods]
@@ -368,30 +364,6 @@ impl PyObservation {
         if let Some(color) = color {
             observation = observation.with_color(color).map_err(errors::input)?;
         }
-        let region = observation.region();
-        let (down, right) = depth::strides(region.height(), region.width());
-        let median_depth = masked_median(&observation, down, right)
-            .or_else(|| masked_median(&observation, 1, 1))
-            .map(f64::from);
-        Ok(Self {
-            pixels: observation.mask().n_set(),
-            observation,
-            median_depth,
-        })
+        Ok(Self { observation })
     }
-}
-
-/// Returns the median depth of masked pixels at these strides, or `None` if none was measured.
-fn masked_median(observation: &Observation, down: usize, right: usize) -> Option<f32> {
-    let region = observation.region();
-    let (depth, mask) = (observation.depth(), observation.mask());
-    let pixels = (region.v_min..region.v_max)
-        .skip(down / 2)
-        .step_by(down)
-        .flat_map(|v| {
-            let columns = (region.u_min..region.u_max).skip(right / 2).step_by(right);
-            columns.map(move |u| (u, v))
-        });
-    let masked = pixels.filter(|(u, v)| mask.get(*u, *v) == Some(true));
-    depth::median(masked.filter_map(|(u, v)| depth.get(u, v)))
 }
