@@ -34,6 +34,12 @@ pub enum Degeneracy {
     /// rotations that nothing determines, such as that of a can around its axis. A silhouette
     /// often has no more information about the translation of a flat side, but that determines it.
     FreezeRotations,
+    /// [`Self::FreezeRotations`], except for rotations that explain the residuals.
+    ///
+    /// Such a rotation would remove more than 3 % of the loss. It stays only at a tenth of the
+    /// threshold. In an image with little noise, a small part of the surface or the silhouette can
+    /// determine a rotation that has little information.
+    FreezeUnexplained,
     /// No step if a direction is degenerate, otherwise the undamped step.
     Refuse,
     /// The undamped step for every threshold; no step if the matrix is singular.

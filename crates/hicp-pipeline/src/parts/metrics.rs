@@ -116,6 +116,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         let policies = [
             ("freeze", Degeneracy::Freeze),
             ("freeze-rotations", Degeneracy::FreezeRotations),
+            ("freeze-unexplained", Degeneracy::FreezeUnexplained),
             ("damp", Degeneracy::Damp),
             ("refuse", Degeneracy::Refuse),
             ("ignore", Degeneracy::Ignore),

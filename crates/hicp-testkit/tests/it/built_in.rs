@@ -186,6 +186,7 @@ fn decorated_metrics_keep_the_laws() {
         Degeneracy::Damp,
         Degeneracy::Freeze,
         Degeneracy::FreezeRotations,
+        Degeneracy::FreezeUnexplained,
     ] {
         let conditioned = || Conditioned {
             metric: PointToPlane,

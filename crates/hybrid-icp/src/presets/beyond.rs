@@ -170,7 +170,7 @@ pub(crate) fn fit_of(iterations: usize) -> Fit {
         filter: (),
         metric: Conditioned {
             metric: PointToPlane,
-            policy: Degeneracy::FreezeRotations,
+            policy: Degeneracy::FreezeUnexplained,
             threshold: UNDETERMINED,
         },
         stop: (Convergence::default(), IterationLimit(iterations)),

@@ -12,7 +12,7 @@ use std::time::Duration;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, perturbed_scene, scene};
 use hybrid_icp::core::{
-    Isometry3, Model, Observation, Point3, Problem, UnitQuaternion, Vector3, se3,
+    Isometry3, Model, ModelConfig, Observation, Point3, Problem, UnitQuaternion, Vector3, se3,
 };
 use hybrid_icp::icp::{
     Bound, HypothesisSearch, Rotations, SearchOptions, Session, Stage, Start, Termination, Verdict,
@@ -137,6 +137,35 @@ fn a_search_finds_the_pose_of_a_flipped_object() {
         righted + 1 >= visible,
         "{righted} of {visible} ended at the truth"
     );
+}
+
+/// The distance of two poses is that of the vertices if a model has no samples.
+#[test]
+fn far_poses_are_searched_without_samples() {
+    let mut righted = 0;
+    for (seed, object) in (0..).zip([Household::Mug, Household::Car, Household::Teapot]) {
+        let scene = scene(object, 0.3, &mut rng(seed));
+        let config = ModelConfig {
+            samples: 0,
+            ..ModelConfig::default()
+        };
+        let model = Model::with_config(scene.model.mesh().clone(), config);
+        for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+            let found = Refiner::preset(Preset::Auto).refine(
+                &model,
+                &scene.observation,
+                &flipped(&scene, axis),
+            );
+            let (angle, _) = se3::pose_distance(&found.outcome.camera_from_object, &scene.truth);
+            let right = angle.to_degrees() < 2.0;
+            righted += usize::from(right);
+            assert!(
+                right || found.confidence < 0.95,
+                "{object:?} {axis:?}: {found:?}"
+            );
+        }
+    }
+    assert!(righted >= 7, "{righted} of 9 ended at the truth");
 }
 
 /// No image shows the rotation of a body of revolution around its axis, and the error ignores it.

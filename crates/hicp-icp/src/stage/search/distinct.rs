@@ -71,23 +71,21 @@ impl Distinct {
     }
 }
 
-/// Returns the samples that are farthest along 26 directions. The largest distance between two
-/// poses is that of a point of the convex hull.
+/// Returns the samples, or the vertices if there are none, that are farthest along 26 directions.
+///
+/// The largest distance between two poses is that of a point of the convex hull.
 fn extremes(model: &Model) -> Vec<Point3<f32>> {
+    let samples = model.samples();
     let step = |index: i32| (index.rem_euclid(3) - 1) as f32;
     let directions = (0..27).map(|i| Vector3::new(step(i), step(i / 3), step(i / 9)));
     let mut points: Vec<Point3<f32>> = Vec::new();
     for direction in directions.filter(|d| *d != Vector3::zeros()) {
-        let along = |s: &&hicp_core::Surfel| s.point.coords.dot(&direction);
-        let farthest = model
-            .samples()
-            .iter()
-            .max_by(|a, b| along(a).total_cmp(&along(b)));
-        points.extend(
-            farthest
-                .map(|s| s.point)
-                .filter(|point| !points.contains(point)),
-        );
+        let along = |point: &Point3<f32>| point.coords.dot(&direction);
+        let vertices = samples.is_empty().then(|| model.mesh().used_points());
+        let vertices = vertices.into_iter().flatten();
+        let candidates = samples.iter().map(|s| s.point).chain(vertices);
+        let farthest = candidates.max_by(|a, b| along(a).total_cmp(&along(b)));
+        points.extend(farthest.filter(|point| !points.contains(point)));
     }
     points
 }

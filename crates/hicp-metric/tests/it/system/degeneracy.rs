@@ -136,7 +136,11 @@ fn nothing_slides_along_a_plane() {
         let motion = numbers.motion(&center(), 100.0, 0.2);
         let (pairs, normal) = lifted(&mut numbers, &motion);
         let middle = motion * center();
-        let freezing = [Degeneracy::Freeze, Degeneracy::FreezeRotations];
+        let freezing = [
+            Degeneracy::Freeze,
+            Degeneracy::FreezeRotations,
+            Degeneracy::FreezeUnexplained,
+        ];
         for policy in [Degeneracy::Damp].into_iter().chain(freezing) {
             let step = conditioned(PointToPlane, policy)
                 .minimize(&Iteration::default(), &pairs)
@@ -195,6 +199,7 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
         Degeneracy::Damp,
         Degeneracy::Freeze,
         Degeneracy::FreezeRotations,
+        Degeneracy::FreezeUnexplained,
         Degeneracy::Refuse,
     ] {
         let step = conditioned(PointToPlane, policy)
@@ -260,6 +265,33 @@ fn weak_translations_are_solved_without_weak_rotations() {
     assert!(all.rotation.angle() > 1e-4, "{}", all.rotation.angle());
 }
 
+/// A weak rotation is solved if it removes enough of the loss, but not a very weak one.
+#[test]
+fn weak_rotations_that_explain_the_loss_are_solved() {
+    let mut numbers = Numbers(88);
+    let plate = at_rest(&plane(&mut numbers));
+    let mut system = PointToPlane.system(&Iteration::default(), &plate).unwrap();
+    let edge = 0.2_f64.sqrt();
+    // Two edges, both of which a rotation of 0.03 around z moves to their place.
+    for side in [0.1, -0.1] {
+        let (point, normal) = (center() + Vector3::x() * side, Vector3::y() * edge * side);
+        system.add_row(&point, &(normal / 0.1), 0.003 * edge, 1.0);
+    }
+    let angle = |system: &NormalEquations, threshold| {
+        let step = system.solve_with(Degeneracy::FreezeUnexplained, threshold);
+        step.unwrap().rotation.angle()
+    };
+    assert!((angle(&system, 5e-3) - 0.03).abs() < 1e-4);
+    assert!(angle(&system, 0.1) < 1e-9);
+    let still = system.solve_with(Degeneracy::FreezeRotations, 5e-3);
+    assert!(still.unwrap().rotation.angle() < 1e-9);
+    // An error that no motion explains.
+    for error in [0.01, -0.01] {
+        system.add_row(&center(), &Vector3::z(), error, 1.0);
+    }
+    assert!(angle(&system, 5e-3) < 1e-9);
+}
+
 /// The threshold is a share of the largest eigenvalue. Above 1 all directions are degenerate; at 0,
 /// only those without information.
 #[test]
@@ -317,6 +349,7 @@ fn numbers_that_are_not_finite_give_none() {
         Degeneracy::Damp,
         Degeneracy::Freeze,
         Degeneracy::FreezeRotations,
+        Degeneracy::FreezeUnexplained,
         Degeneracy::Refuse,
         Degeneracy::Ignore,
     ] {

@@ -19,6 +19,7 @@ fn the_policy_of_a_system_applies_to_its_solution() {
         Degeneracy::Damp,
         Degeneracy::Freeze,
         Degeneracy::FreezeRotations,
+        Degeneracy::FreezeUnexplained,
         Degeneracy::Refuse,
         Degeneracy::Ignore,
     ] {
