@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// The unit of the lengths in a file. Mesh formats do not state it, so callers must.
@@ -12,13 +13,16 @@ use thiserror::Error;
 /// assert_eq!("mm".parse(), Ok(LengthUnit::Millimeters));
 /// assert_eq!(LengthUnit::Centimeters.to_string(), "cm");
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum LengthUnit {
     /// m: scans and robot descriptions.
+    #[serde(rename = "m")]
     Meters,
     /// mm: CAD files, BOP models.
+    #[serde(rename = "mm")]
     Millimeters,
     /// cm: some modeling programs.
+    #[serde(rename = "cm")]
     Centimeters,
 }
 

@@ -9,7 +9,7 @@ use hybrid_icp::core::{Isometry3, Model, Observation};
 use hybrid_icp::{Diagnosis, Fault, Preset, Refiner};
 use serde_json::{Value, json};
 
-use super::inputs::{Inputs, Read, RefineFiles, Region};
+use super::inputs::{Inputs, Read};
 use super::warnings::about_inputs;
 use crate::limits::limits;
 use crate::outputs::{Files, write_json};
@@ -33,7 +33,7 @@ use crate::terminal::{check_stdout, say, warn};
 #[command(mut_arg("bbox", |bbox| bbox.hide(true)))]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    files: RefineFiles,
+    inputs: Inputs,
     /// Write JSON instead of text.
     #[arg(long)]
     json: bool,
@@ -77,9 +77,9 @@ struct Named {
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let unit = arguments.files.files.unit()?;
-    let mut inputs = arguments.files.inputs();
-    if matches!(inputs.region, Region::Box(_)) {
+    let mut inputs = arguments.inputs.clone();
+    let unit = inputs.files.unit()?;
+    if inputs.region.mask.is_none() {
         let text = "--mask <FILE> is missing, expected the mask of the object alone: in a box, other objects hide the fault\n";
         return Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text).into());
     }
@@ -263,7 +263,8 @@ fn many_values(
     observation: &Observation,
     init: &Isometry3<f64>,
 ) -> anyhow::Result<Option<(Named, Observation)>> {
-    let Region::Mask(path, MaskRule::NotZero) = &inputs.region else {
+    let region = &inputs.region;
+    let (Some(path), MaskRule::NotZero) = (&region.mask, region.mask_options.rule()) else {
         return Ok(None);
     };
     let read = limits().read_mask(path, MaskRule::NotZero)?;

@@ -41,7 +41,7 @@ Examples:
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let inputs = Inputs {
         files: arguments.files.clone(),
-        region: arguments.region.region(),
+        region: arguments.region.clone(),
         init: None,
         init_unit: None,
     };

@@ -13,6 +13,7 @@ use hybrid_icp::core::{
     ColorImage, DepthImage, Mask, Model, ModelConfig, Observation, PinholeCamera,
 };
 use hybrid_icp::mask_in_box;
+use serde::{Deserialize, Serialize};
 
 use super::colors;
 use crate::limits::limits;
@@ -22,7 +23,7 @@ use crate::options::{finite, positive};
 const FARTHEST_CAMERAS_METERS: f64 = 1.0;
 
 /// The files that describe the object and the image.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
 pub(crate) struct ImageFiles {
     /// The object's mesh: GLB, glTF, OBJ, OFF, PLY or STL.
     #[arg(long, value_name = "FILE")]
@@ -113,7 +114,7 @@ impl ImageFiles {
 }
 
 /// The pixels of a mask that belong to the object.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Copy, Debug, Args, Serialize, Deserialize)]
 pub(crate) struct MaskOptions {
     /// The smallest value of the mask that is on the object, such as 128 or 0.5. For soft masks and
     /// probabilities.
@@ -141,13 +142,6 @@ fn label(text: &str) -> Result<f64, String> {
 }
 
 impl MaskOptions {
-    pub(super) fn new(mask_threshold: Option<f64>, mask_value: Option<f64>) -> Self {
-        Self {
-            mask_threshold,
-            mask_value,
-        }
-    }
-
     pub(crate) fn rule(self) -> MaskRule {
         match (self.mask_threshold, self.mask_value) {
             (Some(least), _) => MaskRule::AtLeast(least),
@@ -158,15 +152,15 @@ impl MaskOptions {
 }
 
 /// The mask of the object, or its box.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
 #[command(group(ArgGroup::new("region").required(true).args(["mask", "bbox"])))]
 pub(crate) struct RegionOptions {
     /// The object's mask, of the depth image's size: PNG, TIFF, BMP, NPY, NPZ or PGM. Nonzero on
     /// the object, or opaque if the opacity varies.
     #[arg(long, value_name = "FILE")]
-    mask: Option<PathBuf>,
+    pub(super) mask: Option<PathBuf>,
     #[command(flatten)]
-    mask_options: MaskOptions,
+    pub(super) mask_options: MaskOptions,
     /// Without a mask: a box around the object, in pixels: its left and upper side, width and
     /// height. The plane around the box, such as a table, is removed.
     #[arg(
@@ -201,53 +195,6 @@ fn bbox(text: &str) -> Result<Bbox, String> {
     })
 }
 
-impl RegionOptions {
-    pub(super) fn region(&self) -> Region {
-        match (&self.mask, self.bbox) {
-            (Some(path), _) => Region::Mask(path.clone(), self.mask_options.rule()),
-            (None, bbox) => Region::Box(bbox.unwrap_or_default()),
-        }
-    }
-}
-
-/// The files of a refinement: object, image, mask and initial pose.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct RefineFiles {
-    #[command(flatten)]
-    pub(crate) files: ImageFiles,
-    #[command(flatten)]
-    region: RegionOptions,
-    /// The rough pose, model to camera: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c
-    /// (three numbers in mm); or a 4x4 matrix, R and t, or a translation and a quaternion of stated
-    /// order, as JSON, YAML, text or NPY; or a TUM line (x y z qx qy qz qw).
-    #[arg(long, value_name = "FILE")]
-    init: PathBuf,
-    /// Unit of the translation of --init: m, mm or cm. If not given: mm for cam_t_m2c, m for all
-    /// other forms.
-    #[arg(long, value_name = "UNIT")]
-    init_unit: Option<LengthUnit>,
-}
-
-impl RefineFiles {
-    pub(crate) fn inputs(&self) -> Inputs {
-        Inputs {
-            files: self.files.clone(),
-            region: self.region.region(),
-            init: Some(self.init.clone()),
-            init_unit: self.init_unit,
-        }
-    }
-}
-
-/// The part of the image that shows the object.
-#[derive(Clone, Debug)]
-pub(crate) enum Region {
-    /// The file of a mask.
-    Mask(PathBuf, MaskRule),
-    /// A box: x, y, width and height, pixels.
-    Box(Bbox),
-}
-
 /// Reads a camera for the images of `size` in `image`.
 fn read_camera(path: &Path, size: (u32, u32), image: &Path) -> anyhow::Result<CameraFile> {
     match limits().read_camera(path, size) {
@@ -264,12 +211,22 @@ fn read_camera(path: &Path, size: (u32, u32), image: &Path) -> anyhow::Result<Ca
 }
 
 /// The inputs of a refinement, or without an initial pose those of an estimate.
-#[derive(Clone, Debug)]
+///
+/// They are the options of the program, and a trace stores them as JSON.
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
 pub(crate) struct Inputs {
+    #[command(flatten)]
     pub(crate) files: ImageFiles,
-    pub(crate) region: Region,
+    #[command(flatten)]
+    pub(crate) region: RegionOptions,
+    /// The rough pose, model to camera: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c
+    /// (three numbers in mm); or a 4x4 matrix, R and t, or a translation and a quaternion of stated
+    /// order, as JSON, YAML, text or NPY; or a TUM line (x y z qx qy qz qw).
+    #[arg(long, value_name = "FILE", required = true)]
     pub(crate) init: Option<PathBuf>,
-    /// The unit of the initial pose's translation, if stated.
+    /// Unit of the translation of --init: m, mm or cm. If not given: mm for cam_t_m2c, m for all
+    /// other forms.
+    #[arg(long, value_name = "UNIT")]
     pub(crate) init_unit: Option<LengthUnit>,
 }
 
@@ -297,9 +254,11 @@ impl Inputs {
             Some(path) => Some(read_camera(path, depth_size, &files.depth)?),
             None => None,
         };
-        let (file_mask, bbox) = match &self.region {
-            Region::Mask(path, rule) => {
-                let MaskFile { mask, warning, .. } = limits.read_mask(path, *rule)?;
+        let region = &self.region;
+        let (file_mask, bbox) = match (&region.mask, region.bbox.unwrap_or_default()) {
+            (Some(path), _) => {
+                let read = limits.read_mask(path, region.mask_options.rule())?;
+                let MaskFile { mask, warning, .. } = read;
                 let (width, height) = (mask.width(), mask.height());
                 if (width, height) != depth_size && depth_camera.is_none() {
                     let (w, h) = depth_size;
@@ -312,22 +271,22 @@ impl Inputs {
                 warnings.extend(warning.map(|text| format!("{}: {text}", path.display())));
                 (Some(mask), [0.0; 4])
             }
-            Region::Box(bbox) => {
-                let ([x, y, width, height], (w, h)) = (*bbox, depth_size);
-                if !box_overlaps(*bbox, depth_size) {
+            (None, bbox) => {
+                let ([x, y, width, height], (w, h)) = (bbox, depth_size);
+                if !box_overlaps(bbox, depth_size) {
                     bail!(
                         "--bbox {x},{y},{width},{height}: the box is outside of the {w}x{h} image {}, expected x,y,width,height in its pixels",
                         files.depth.display()
                     );
                 }
-                let warning = warning_of_box(*bbox, depth_size);
+                let warning = warning_of_box(bbox, depth_size);
                 warnings
                     .extend(warning.map(|text| format!("--bbox {x},{y},{width},{height}: {text}")));
-                (None, *bbox)
+                (None, bbox)
             }
         };
-        let (size, sized) = match (&file_mask, &self.region) {
-            (Some(mask), Region::Mask(path, _)) if depth_camera.is_some() => {
+        let (size, sized) = match (&file_mask, &region.mask) {
+            (Some(mask), Some(path)) if depth_camera.is_some() => {
                 ((mask.width(), mask.height()), path)
             }
             _ => (depth_size, &files.depth),
@@ -419,24 +378,20 @@ impl Inputs {
 
     /// Returns the path of the mask, or the option of the box.
     pub(crate) fn mask_name(&self) -> String {
-        match &self.region {
-            Region::Mask(path, _) => path.display().to_string(),
-            Region::Box(_) => "--bbox".to_owned(),
+        match &self.region.mask {
+            Some(path) => path.display().to_string(),
+            None => "--bbox".to_owned(),
         }
     }
 
     /// Returns the files with the options that name them.
     pub(crate) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
         let files = &self.files;
-        let mask = match &self.region {
-            Region::Mask(path, _) => Some(path),
-            Region::Box(_) => None,
-        };
         let given = [
             ("--model", Some(&files.model)),
             ("--symmetries", files.symmetries.as_ref()),
             ("--depth", Some(&files.depth)),
-            ("--mask", mask),
+            ("--mask", self.region.mask.as_ref()),
             ("--rgb", files.rgb.as_ref()),
             ("--camera", Some(&files.camera)),
             ("--depth-camera", files.depth_camera.as_ref()),

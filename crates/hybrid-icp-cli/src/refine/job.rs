@@ -7,7 +7,7 @@ use clap::Args;
 use hicp_picture::Picture;
 use hybrid_icp::icp::Verdict;
 
-use super::inputs::{Inputs, Read, Region};
+use super::inputs::{Inputs, Read};
 use super::report::{self, Report};
 use super::trace::{self, TraceLines};
 use super::warnings;
@@ -71,7 +71,7 @@ impl JobOptions {
 
         let mut refiner = pipeline.refiner();
         if let Some(header) = &mut header {
-            header["depth_scale"] = depth_scale.into();
+            header["inputs"]["files"]["depth_scale"] = depth_scale.into();
         }
         let mut trace = TraceLines::new(header);
         let start = Instant::now();
@@ -84,7 +84,7 @@ impl JobOptions {
 
         let found = refined.outcome.camera_from_object;
         let from = init.unwrap_or(found);
-        let in_box = matches!(inputs.region, Region::Box(_));
+        let in_box = inputs.region.mask.is_none();
         let reason = warnings::reason(&refined, &model, &observation, &from, in_box);
         let summary = report::summary(&refined, &reason, init.is_none());
         let doctor = warnings::doctor(inputs);

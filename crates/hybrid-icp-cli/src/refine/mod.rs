@@ -12,7 +12,7 @@ pub(crate) mod warnings;
 
 use clap::Args;
 
-use self::inputs::RefineFiles;
+use self::inputs::Inputs;
 use self::job::JobOptions;
 
 /// Refine one pose in one depth image.
@@ -29,7 +29,7 @@ use self::job::JobOptions;
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    files: RefineFiles,
+    inputs: Inputs,
     #[command(flatten)]
     job: JobOptions,
 }
@@ -58,5 +58,5 @@ pose.json:   {\"cam_R_m2c\": [1, 0, 0, 0, 1, 0, 0, 0, 1],
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    arguments.job.run(&arguments.files.inputs())
+    arguments.job.run(&arguments.inputs)
 }

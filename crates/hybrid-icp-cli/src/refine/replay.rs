@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
 use clap::Args;
-use hicp_io::LengthUnit;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::inputs::{ImageFiles, Inputs, MaskOptions, Region};
+use super::inputs::Inputs;
 use super::trace::TraceLines;
 use crate::choice::Pipeline;
 use crate::limits::limits;
@@ -87,34 +86,15 @@ fn replay(header: &Header<'_>) -> anyhow::Result<Vec<Value>> {
     let overrides: Vec<String> = header.get("set", "a list of strings")?;
     let origin = format!("the pipeline of {}", header.path.display());
     let pipeline = Pipeline::parse(&origin, header.text("toml")?, &overrides)?;
-    let inputs = Inputs {
-        files: ImageFiles {
-            model: header.text("model")?.into(),
-            model_unit: header.unit("model_unit")?,
-            symmetries: header.get("symmetries", "a string")?,
-            depth: header.text("depth")?.into(),
-            depth_scale: Some(header.get("depth_scale", "a number")?),
-            rgb: header.get("rgb", "a string")?,
-            camera: header.text("camera")?.into(),
-            depth_camera: header.get("depth-camera", "a string")?,
-            camera_from_depth: header.get("camera-from-depth", "a string")?,
-            camera_from_depth_unit: header.unit("camera_from_depth_unit")?,
-        },
-        region: match header.line.get("bbox") {
-            Some(_) => Region::Box(header.get("bbox", "four numbers")?),
-            None => {
-                let least = header.get("mask_threshold", "a number")?;
-                let value = header.get("mask_value", "a number")?;
-                let options = MaskOptions::new(least, value);
-                Region::Mask(header.text("mask")?.into(), options.rule())
-            }
-        },
-        init: match header.line.get("init") {
-            Some(_) => Some(header.text("init")?.into()),
-            None => None,
-        },
-        init_unit: header.unit("init_unit")?,
-    };
+    let inputs = serde_path_to_error::deserialize::<_, Inputs>(&header.line["inputs"]);
+    let inputs = inputs.map_err(|error| {
+        let (place, key) = (header.path.display(), format!("inputs.{}", error.path()));
+        anyhow!(
+            "{place}:1: {:?}: {}",
+            key.trim_end_matches('.'),
+            error.inner()
+        )
+    })?;
     let read = inputs.read()?;
     let observation = inputs.observe(read.depth, read.mask, read.color, read.camera)?;
     let mut trace = TraceLines::new(Some(header.line.clone()));
@@ -147,12 +127,6 @@ impl Header<'_> {
 
     fn text(&self, key: &str) -> anyhow::Result<String> {
         self.get(key, "a string")
-    }
-
-    fn unit(&self, key: &str) -> anyhow::Result<Option<LengthUnit>> {
-        let text: Option<String> = self.get(key, "a string")?;
-        let unit = text.map(|text| text.parse()).transpose();
-        unit.map_err(|_| self.refuse(key, "m, mm or cm"))
     }
 
     fn refuse(&self, key: &str, expected: &str) -> anyhow::Error {

@@ -3,14 +3,13 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use anyhow::anyhow;
-use hicp_io::MaskRule;
+use anyhow::bail;
 use hybrid_icp::Trace;
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::icp::{IterationEvent, Observer, RegimeEvent, StageEvent};
 use serde_json::{Value, json};
 
-use super::inputs::{Inputs, Region};
+use super::inputs::Inputs;
 use crate::choice::Pipeline;
 use crate::pose_json::add_pose;
 
@@ -64,42 +63,22 @@ impl TraceLines {
 ///
 /// Fails if a path is not UTF-8, because JSON cannot represent it.
 pub(super) fn header(inputs: &Inputs, pipeline: &Pipeline) -> anyhow::Result<Value> {
-    let mut line = json!({
+    for (option, path) in inputs.files() {
+        if path.to_str().is_none() {
+            bail!(
+                "{option} names {}, which is not UTF-8 and cannot be written to --trace: rename the file or omit --trace",
+                path.display()
+            );
+        }
+    }
+    Ok(json!({
         "event": "start",
         "version": env!("CARGO_PKG_VERSION"),
         "pipeline": pipeline.name,
         "toml": pipeline.toml,
         "set": pipeline.overrides,
-        "model_unit": inputs.files.unit()?.to_string(),
-    });
-    let units = [
-        ("init_unit", inputs.init_unit),
-        (
-            "camera_from_depth_unit",
-            inputs.files.camera_from_depth_unit,
-        ),
-    ];
-    for (key, unit) in units {
-        if let Some(unit) = unit {
-            line[key] = json!(unit.to_string());
-        }
-    }
-    match &inputs.region {
-        Region::Box(bbox) => line["bbox"] = json!(bbox),
-        Region::Mask(_, MaskRule::AtLeast(least)) => line["mask_threshold"] = json!(least),
-        Region::Mask(_, MaskRule::Equal(value)) => line["mask_value"] = json!(value),
-        Region::Mask(_, MaskRule::NotZero) => {}
-    }
-    for (option, path) in inputs.files() {
-        let text = path.to_str().ok_or_else(|| {
-            anyhow!(
-                "{option} names {}, which is not UTF-8 and cannot be written to --trace: rename the file or omit --trace",
-                path.display()
-            )
-        })?;
-        line[option.trim_start_matches('-')] = json!(text);
-    }
-    Ok(line)
+        "inputs": inputs,
+    }))
 }
 
 impl Observer for TraceLines {

@@ -5,7 +5,7 @@ use hybrid_icp::core::{Isometry3, Model, Observation};
 use hybrid_icp::icp::Verdict;
 use hybrid_icp::{Diagnosis, Fault, Refinement, Warning};
 
-use super::inputs::{Inputs, Region};
+use super::inputs::Inputs;
 
 /// The largest depth of a `DepthImage`.
 const MAX_DEPTH_METERS: f32 = 1000.0;
@@ -14,8 +14,8 @@ const MAX_DEPTH_METERS: f32 = 1000.0;
 ///
 /// The doctor requires a mask and an initial pose, so the end is empty without them.
 pub(super) fn doctor(inputs: &Inputs) -> &'static str {
-    match (&inputs.region, &inputs.init) {
-        (Region::Mask(..), Some(_)) => "; `hybrid-icp doctor` looks for the cause",
+    match (&inputs.region.mask, &inputs.init) {
+        (Some(_), Some(_)) => "; `hybrid-icp doctor` looks for the cause",
         _ => "",
     }
 }
@@ -114,9 +114,9 @@ pub(super) fn about_facts(
     let mask = inputs.mask_name();
     let facts = Diagnosis::facts(object, observation).into_iter();
     let in_words = |fault: Fault| match fault {
-        Fault::MaskEmpty => Some(match inputs.region {
-            Region::Mask(..) => format!("{mask}: {fault}: {}", fault.fix()),
-            Region::Box(_) => {
+        Fault::MaskEmpty => Some(match inputs.region.mask {
+            Some(_) => format!("{mask}: {fault}: {}", fault.fix()),
+            None => {
                 format!("{mask}: no depth was measured in the box: check the box and {depth}")
             }
         }),

@@ -167,7 +167,12 @@ fn a_trace_is_replayed_to_the_last_digit() {
     let complaint = format!("trace.jsonl:{} differs", number + 1);
     replay().fails(&[&complaint]);
     // Other files are refused.
+    let in_inches = text.replace(r#""model_unit":"m""#, r#""model_unit":"inch""#);
     for (content, expected) in [
+        (
+            &*in_inches,
+            "trace.jsonl:1: \"inputs.files.model_unit\": unknown variant `inch`, expected one of `m`, `mm`, `cm`",
+        ),
         ("", "empty, expected a trace"),
         ("{", "trace.jsonl:1: expected a line of a trace"),
         ("{\"event\": \"iteration\"}", "expected \"start\""),
