@@ -26,17 +26,8 @@ impl ModelFolder {
     ///
     /// As for [`ReadLimits::read_models_info`].
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, IoError> {
-        Self::open_within(ReadLimits::DEFAULT, dir)
-    }
-
-    /// Opens a folder as [`ModelFolder::open`] does, within `limits`.
-    ///
-    /// # Errors
-    ///
-    /// As for [`ReadLimits::read_models_info`].
-    pub fn open_within(limits: ReadLimits, dir: impl AsRef<Path>) -> Result<Self, IoError> {
         let dir = dir.as_ref();
-        Self::with_info(limits, dir, dir.join("models_info.json"))
+        Self::with_info(ReadLimits::DEFAULT, dir, dir.join("models_info.json"))
     }
 
     /// Opens a folder as [`ModelFolder::open`] does, within `limits`, with the diameters and

@@ -52,7 +52,7 @@ mod row_log;
 pub use row_log::RowLog;
 
 mod unit;
-pub use unit::{LengthUnit, UnknownUnit};
+pub use unit::LengthUnit;
 
 mod mesh;
 pub use mesh::{MeshFile, read_mesh, write_obj, write_ply};

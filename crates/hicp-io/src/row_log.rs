@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::error::{IoError, Place, quote};
 use crate::limits::{Limit, ReadLimits};
-use crate::source::{check_regular, is_absent};
+use crate::source::check_regular;
 
 /// A text file of rows for a long run, so that a killed run can resume.
 ///
@@ -31,7 +31,7 @@ use crate::source::{check_regular, is_absent};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let dir = tempfile::tempdir()?;
 /// let path = dir.path().join("rows.csv");
-/// let log = RowLog::create(&path, "case,seconds")?;
+/// let (log, _) = RowLog::resume(&path, "case,seconds", 1, &ReadLimits::DEFAULT)?;
 /// log.append("0,1.5")?;
 /// drop(log); // The run is killed here.
 ///
@@ -48,25 +48,11 @@ pub struct RowLog {
 }
 
 impl RowLog {
-    /// Creates a log at a path without a file. The header is one line, without a line break.
-    ///
-    /// # Errors
-    ///
-    /// [`IoError`] if the file already exists or cannot be written.
-    pub fn create(path: impl AsRef<Path>, header: &str) -> Result<Self, IoError> {
-        let path = path.as_ref();
-        if !is_absent(path) {
-            let text = "it may hold rows of a run that did not finish: resume that run, or remove the file";
-            let exists = io::Error::new(io::ErrorKind::AlreadyExists, text);
-            return Err(IoError::write(path, exists));
-        }
-        Ok(Self::resume(path, header, 1, &ReadLimits::DEFAULT)?.0)
-    }
-
     /// Opens a log and returns its complete rows, each without its last line break.
     ///
-    /// Creates the log if there is no file. An incomplete row at the end is removed from the file.
-    /// Bytes that are not UTF-8 are replaced by U+FFFD, so that the caller's parser reports them.
+    /// Creates the log if there is no file. The header is one line, without a line break. An
+    /// incomplete row at the end is removed from the file. Bytes that are not UTF-8 are replaced by
+    /// U+FFFD, so that the caller's parser reports them.
     ///
     /// # Errors
     ///
@@ -208,7 +194,7 @@ mod tests {
     fn a_killed_run_resumes_with_its_complete_rows() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("log");
-        let log = RowLog::create(&path, "h").unwrap();
+        let (log, _) = resume(&path, "h").unwrap();
         log.append("a").unwrap();
         log.append("b\nc").unwrap();
         log.sync().unwrap();
@@ -251,14 +237,13 @@ mod tests {
             assert!(error.contains("seed=2 n=5\" as in this run"), "{error}");
             assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
         }
-        assert!(RowLog::create(&path, "h").is_err());
     }
 
     #[test]
     fn a_log_has_one_writer_and_a_size_limit() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("log");
-        let log = RowLog::create(&path, "h").unwrap();
+        let (log, _) = resume(&path, "h").unwrap();
         let error = resume(&path, "h").unwrap_err();
         let source = std::error::Error::source(&error).unwrap().to_string();
         assert!(source.contains("another run has the file open"), "{source}");

@@ -4,7 +4,6 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 /// The unit of the lengths in a file. Mesh formats do not state it, so callers must.
 ///
@@ -56,22 +55,13 @@ impl fmt::Display for LengthUnit {
 }
 
 impl FromStr for LengthUnit {
-    type Err = UnknownUnit;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, UnknownUnit> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let mut units = [Self::Meters, Self::Millimeters, Self::Centimeters].into_iter();
-        let found = text.to_owned();
         let named = units.find(|unit| unit.to_string() == text);
-        named.ok_or(UnknownUnit { found })
+        named.ok_or_else(|| format!("unit is {text:?}, expected m, mm or cm"))
     }
-}
-
-/// The error for a text that is not the abbreviation of a [`LengthUnit`].
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("unit is {found:?}, expected m, mm or cm")]
-pub struct UnknownUnit {
-    /// The text given.
-    pub found: String,
 }
 
 #[cfg(test)]
@@ -91,6 +81,6 @@ mod tests {
         assert_eq!(LengthUnit::Millimeters.meters_per_unit(), 0.001);
         assert_eq!(LengthUnit::Centimeters.meters_per_unit(), 0.01);
         let error = "inch".parse::<LengthUnit>().unwrap_err();
-        assert_eq!(error.to_string(), r#"unit is "inch", expected m, mm or cm"#);
+        assert_eq!(error, r#"unit is "inch", expected m, mm or cm"#);
     }
 }

@@ -153,7 +153,7 @@ pub(crate) fn read_cloud(
     path: PathBuf,
     unit: &str,
 ) -> PyResult<(Matrix<f32>, Option<Matrix<f32>>)> {
-    let unit: LengthUnit = unit.parse().map_err(errors::input)?;
+    let unit: LengthUnit = unit.parse().map_err(InputError::new_err)?;
     let PointCloud {
         points, normals, ..
     } = py

@@ -18,13 +18,15 @@ fn diameters_and_models_are_read_within_the_limits() {
     let path = dir.path().join("obj_000001.ply");
     hicp_io::write_ply(path, &mesh, LengthUnit::Millimeters).unwrap();
     let info = r#"{"1": {"diameter": 123.0}}"#;
-    std::fs::write(dir.path().join("models_info.json"), info).unwrap();
+    let info_path = dir.path().join("models_info.json");
+    std::fs::write(&info_path, info).unwrap();
+    let open = |limits| ModelFolder::with_info(limits, dir.path(), &info_path);
     let exact = ReadLimits {
         max_json_bytes: info.len() as u64,
         max_triangles: mesh.triangles().len() as u64,
         ..ReadLimits::DEFAULT
     };
-    let folder = ModelFolder::open_within(exact, dir.path()).unwrap();
+    let folder = open(exact).unwrap();
     assert_eq!(folder.read(1).unwrap().unwrap().diameter(), 0.123);
     assert!(folder.read(2).unwrap().is_none());
 
@@ -32,7 +34,7 @@ fn diameters_and_models_are_read_within_the_limits() {
         max_json_bytes: exact.max_json_bytes - 1,
         ..exact
     };
-    let refused = ModelFolder::open_within(tight, dir.path()).map(|_| ());
+    let refused = open(tight).map(|_| ());
     assert!(matches!(
         refused,
         Err(IoError { kind: IoErrorKind::Limit, expected, .. }) if expected.contains("max_json_bytes")
@@ -41,7 +43,7 @@ fn diameters_and_models_are_read_within_the_limits() {
         max_triangles: exact.max_triangles - 1,
         ..exact
     };
-    let folder = ModelFolder::open_within(tight, dir.path()).unwrap();
+    let folder = open(tight).unwrap();
     assert!(matches!(
         folder.read(1),
         Err(IoError { kind: IoErrorKind::Limit, expected, .. }) if expected.contains("max_triangles")

@@ -6,7 +6,7 @@ use hicp_bop::{
     BoxMask, DatasetRefiner, Fault, FaultKind, MaskSource, ModelFolder, Rescore, RowResult,
     RowStatus, detections_by_frame,
 };
-use hicp_io::bop::{Detection, ResultRow, Rle};
+use hicp_io::bop::{Detection, ResultRow, Rle, Scene};
 use hicp_io::{IoError, ReadLimits, write_mask_png};
 use hybrid_icp::core::{Isometry3, Mask};
 use hybrid_icp::{Preset, Refiner};
@@ -186,9 +186,10 @@ fn limits_and_errors_are_reported_as_faults() {
         ..ReadLimits::DEFAULT
     };
     let dataset = world.dataset.with_limits(limits);
-    let folder = ModelFolder::open(dataset.models_dir().unwrap()).unwrap();
+    let models = dataset.models_dir().unwrap();
+    let folder = ModelFolder::open(&models).unwrap();
     assert!(folder.read(BLOCK).unwrap().is_some());
-    let folder = ModelFolder::open_within(limits, dataset.models_dir().unwrap()).unwrap();
+    let folder = ModelFolder::with_info(limits, &models, folder.info_path()).unwrap();
     let error = folder.read(BLOCK).unwrap_err();
     let fault = Fault::of(&error);
     assert!(
@@ -199,7 +200,7 @@ fn limits_and_errors_are_reported_as_faults() {
     let scene = dataset.scene("test", 1).unwrap();
     let error = scene.read_depth(4).unwrap_err();
     assert!(Fault::of(&error).text.contains("000004.png"), "{error}");
-    assert!(scene.with_limits(ReadLimits::DEFAULT).read_depth(4).is_ok());
+    assert!(Scene::open(scene.dir()).unwrap().read_depth(4).is_ok());
     let missing: IoError = dataset.scene("test", 2).unwrap_err();
     assert!(Fault::of(&missing).kind == FaultKind::Missing);
     assert_eq!(fault, Fault::damaged(fault.text.clone()));

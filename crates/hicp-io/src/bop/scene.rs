@@ -83,13 +83,6 @@ impl Scene {
         self.dir.join(format!("{folder}{}/{name}", self.suffix))
     }
 
-    /// Sets the limits for reading images, instead of [`ReadLimits::DEFAULT`].
-    #[must_use]
-    pub fn with_limits(mut self, limits: ReadLimits) -> Self {
-        self.limits = limits;
-        self
-    }
-
     /// Returns the folder.
     #[must_use]
     pub fn dir(&self) -> &Path {

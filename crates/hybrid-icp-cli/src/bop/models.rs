@@ -66,7 +66,7 @@ pub(crate) fn color_faults(
 
 /// Reads the models of some objects from a folder, without colors, on all threads.
 pub(crate) fn read(dir: &Path, objects: &BTreeSet<u32>) -> Result<Models, IoError> {
-    let folder = ModelFolder::open_within(limits(), dir)?;
+    let folder = ModelFolder::with_info(limits(), dir, dir.join("models_info.json"))?;
     Ok(read_from(&folder.without_color(), objects))
 }
 

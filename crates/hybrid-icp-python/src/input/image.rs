@@ -163,7 +163,7 @@ pub(crate) fn read_mask(
 #[pyo3(signature = (path, *, unit = None))]
 pub(crate) fn read_pose(py: Python<'_>, path: PathBuf, unit: Option<&str>) -> PyResult<Matrix> {
     let unit = unit.map(str::parse::<LengthUnit>).transpose();
-    let unit = unit.map_err(errors::input)?;
+    let unit = unit.map_err(InputError::new_err)?;
     py.detach(|| hicp_io::read_pose(&path, unit))
         .map(|file| Matrix::new(4, array::to_matrix(&file.camera_from_object).to_vec()))
         .map_err(errors::file)

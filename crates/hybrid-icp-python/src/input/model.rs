@@ -396,7 +396,7 @@ impl<'a, 'py> Options<'a, 'py> {
             )));
         }
         Ok(Self {
-            unit: unit.parse().map_err(errors::input)?,
+            unit: unit.parse().map_err(InputError::new_err)?,
             samples,
             diameter,
             symmetries,

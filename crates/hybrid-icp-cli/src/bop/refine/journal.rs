@@ -11,58 +11,41 @@ use hicp_io::{RowLog, is_absent};
 use crate::limits::limits;
 use crate::terminal::warn;
 
-/// A file next to the output.
+/// Starts a journal for a run with these settings, or with `resume` continues an existing one.
 ///
-/// It has a header with the settings of the run, then a line of JSON for every finished image.
-#[derive(Debug)]
-pub(super) struct Journal(RowLog);
-
-impl Journal {
-    /// Starts a journal for a run with these settings, or with `resume` continues an existing one.
-    ///
-    /// Returns the stored result of every image; `None` for images that are not finished.
-    pub(super) fn open(
-        path: &Path,
-        settings: &str,
-        resume: bool,
-        frames: &[FrameRows],
-    ) -> anyhow::Result<(Self, Vec<Option<FrameResult>>)> {
-        if !resume && !is_absent(path) {
-            bail!(
-                "{} exists and may have the results of an unfinished run: continue that run with --resume, or remove the file",
-                path.display()
-            );
-        }
-        let (log, lines) = RowLog::resume(path, settings, 1, &limits())?;
-        let mut results: Vec<Option<FrameResult>> = frames.iter().map(|_| None).collect();
-        let mut damaged = 0;
-        for line in lines {
-            match serde_json::from_str::<(usize, FrameResult)>(&line) {
-                Ok((place, result)) if is_of(frames.get(place), &result) => {
-                    results[place] = Some(result);
-                }
-                _ => damaged += 1,
+/// It is a file next to the output. It has a header with the settings of the run, then a line of
+/// JSON for every finished image. Returns the stored result of every image; `None` for images that
+/// are not finished.
+pub(super) fn open(
+    path: &Path,
+    settings: &str,
+    resume: bool,
+    frames: &[FrameRows],
+) -> anyhow::Result<(RowLog, Vec<Option<FrameResult>>)> {
+    if !resume && !is_absent(path) {
+        bail!(
+            "{} exists and may have the results of an unfinished run: continue that run with --resume, or remove the file",
+            path.display()
+        );
+    }
+    let (log, lines) = RowLog::resume(path, settings, 1, &limits())?;
+    let mut results: Vec<Option<FrameResult>> = frames.iter().map(|_| None).collect();
+    let mut damaged = 0;
+    for line in lines {
+        match serde_json::from_str::<(usize, FrameResult)>(&line) {
+            Ok((place, result)) if is_of(frames.get(place), &result) => {
+                results[place] = Some(result);
             }
+            _ => damaged += 1,
         }
-        if damaged > 0 {
-            warn(format_args!(
-                "{}: {damaged} lines are damaged; their images are refined again",
-                path.display()
-            ));
-        }
-        Ok((Self(log), results))
     }
-
-    /// Stores the result of an image, given by its place among the images of the run.
-    pub(super) fn append(&self, place: usize, result: &FrameResult) -> anyhow::Result<()> {
-        self.0.append(&serde_json::to_string(&(place, result))?)?;
-        Ok(self.0.sync()?)
+    if damaged > 0 {
+        warn(format_args!(
+            "{}: {damaged} lines are damaged; their images are refined again",
+            path.display()
+        ));
     }
-
-    /// Removes the journal of a run whose output is written.
-    pub(super) fn remove(self) -> anyhow::Result<()> {
-        Ok(self.0.remove()?)
-    }
+    Ok((log, results))
 }
 
 /// Returns whether a result has exactly the rows of an image.

@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use anyhow::bail;
 use hicp_bop::{DatasetRefiner, FrameResult, FrameRows, Scenes, frames_of};
+use hicp_io::RowLog;
 use hicp_io::bop::ResultRow;
 use rayon::prelude::*;
 
 use super::job::RefineJob;
-use super::journal::Journal;
 use super::summary::{Distrust, mean_seconds, report_faults, summary};
-use super::{rows_file, settings, warnings};
+use super::{journal, rows_file, settings, warnings};
 use crate::bop::models;
 use crate::interrupt;
 use crate::outputs::journal_of;
@@ -45,7 +45,7 @@ impl RefineJob<'_> {
         };
         let (journal, mut results) = match journal_of(self.output) {
             Some(path) => {
-                let (journal, results) = Journal::open(&path, &settings, self.resume, &frames)?;
+                let (journal, results) = journal::open(&path, &settings, self.resume, &frames)?;
                 (Some(journal), results)
             }
             None => (None, vec![None; frames.len()]),
@@ -127,7 +127,7 @@ impl RefineJob<'_> {
     fn work(
         &self,
         shared: &DatasetRefiner,
-        journal: Option<&Journal>,
+        journal: Option<&RowLog>,
         rows: &[ResultRow],
         frames: &[FrameRows],
         results: &mut [Option<FrameResult>],
@@ -145,7 +145,10 @@ impl RefineJob<'_> {
                 }
                 if result.is_none() {
                     let done = shared.frame(refiner, *frame, rows, indices);
-                    journal.map_or(Ok(()), |journal| journal.append(place, &done))?;
+                    if let Some(journal) = journal {
+                        journal.append(&serde_json::to_string(&(place, &done))?)?;
+                        journal.sync()?;
+                    }
                     *result = Some(done);
                 }
                 progress.inc(indices.len() as u64);
