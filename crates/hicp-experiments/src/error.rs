@@ -34,7 +34,7 @@ pub enum ExperimentError {
     Figure(String),
     /// A pipeline cannot be built.
     #[error(transparent)]
-    Pipeline(Box<PipelineError>),
+    Pipeline(#[from] PipelineError),
     /// A camera cannot be used.
     #[error(transparent)]
     Camera(#[from] hicp_core::CameraError),
@@ -44,12 +44,6 @@ pub enum ExperimentError {
     /// A simulation cannot be set up.
     #[error(transparent)]
     Sim(#[from] SimError),
-}
-
-impl From<PipelineError> for ExperimentError {
-    fn from(error: PipelineError) -> Self {
-        Self::Pipeline(Box::new(error))
-    }
 }
 
 impl ExperimentError {

@@ -7,7 +7,7 @@ use hicp_core::internal::nearest_name;
 use hicp_icp::MAX_ITERATIONS;
 use toml::de::DeValue;
 
-use crate::error::PipelineError;
+use crate::error::{PipelineError, PipelineErrorKind, Place};
 use crate::fields::{Fields, Spot};
 use crate::kind::{BoxedPart, PartKind};
 use crate::limits::PipelineLimits;
@@ -134,31 +134,41 @@ impl<'a> Context<'a> {
 
     /// Returns the error of a field that is missing, or whose value is not accepted.
     fn refuse(&self, found: Option<&DeValue<'_>>, spot: &Spot, expected: String) -> PipelineError {
-        let place = spot.place(self.origin, self.text);
-        match found.map(describe) {
-            Some(found) => PipelineError::Value {
-                place,
-                found,
-                expected,
-            },
-            None => PipelineError::Missing { place, expected },
-        }
+        let (kind, found) = match found.map(describe) {
+            Some(found) => (PipelineErrorKind::Value, format!("found {found}")),
+            None => (PipelineErrorKind::Missing, "missing".to_owned()),
+        };
+        self.error(kind, spot, format!("{found}, expected {expected}"))
     }
 
     fn unknown(
         &self,
         spot: &Spot,
-        problem: String,
+        mut problem: String,
         (name, elsewhere): (&str, Option<String>),
         known: Vec<&'static str>,
     ) -> PipelineError {
-        let nearest = nearest_name(name, known.iter().copied());
-        PipelineError::Unknown {
-            place: spot.place(self.origin, self.text),
-            problem,
-            suggestion: nearest.map(str::to_owned).or(elsewhere),
-            known: known.into_iter().map(str::to_owned).collect(),
+        let nearest = nearest_name(name, known.iter().copied()).map(str::to_owned);
+        if let Some(name) = nearest.or(elsewhere) {
+            problem += &format!("; did you mean {name:?}?");
         }
+        let known = match &known[..] {
+            [] => "none".to_owned(),
+            _ => known.join(", "),
+        };
+        let problem = format!("{problem}; there are: {known}");
+        self.error(PipelineErrorKind::Unknown, spot, problem)
+    }
+
+    /// Returns an error at a field of the file.
+    pub(crate) fn error(
+        &self,
+        kind: PipelineErrorKind,
+        spot: &Spot,
+        problem: String,
+    ) -> PipelineError {
+        let place = Place::of(self.origin, self.text, spot.start, &spot.field);
+        PipelineError::new(kind, place, problem)
     }
 }
 
@@ -276,8 +286,8 @@ impl Parameters<'_> {
     #[must_use]
     pub fn refuse(&self, field: &str, expected: String) -> PipelineError {
         let Some((context, fields)) = &self.reading else {
-            let place = Box::default();
-            return PipelineError::Missing { place, expected };
+            let problem = format!("missing, expected {expected}");
+            return PipelineError::new(PipelineErrorKind::Missing, Box::default(), problem);
         };
         let (found, spot) = fields.field(field);
         context.refuse(found, &spot, expected)

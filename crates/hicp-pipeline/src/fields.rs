@@ -3,7 +3,6 @@
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::error::Place;
 use crate::value::NOWHERE;
 
 /// A field, and the byte of the file at which it starts; `None` for what an override set.
@@ -23,11 +22,6 @@ impl Spot {
             },
             start: self.start.filter(|_| start != NOWHERE).map(|_| start),
         }
-    }
-
-    /// Returns the place in a file, for an error.
-    pub(crate) fn place(&self, origin: &str, text: &str) -> Box<Place> {
-        Place::of(origin, text, self.start, &self.field)
     }
 }
 

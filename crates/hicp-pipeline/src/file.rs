@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::build::Context;
 use crate::catalog::Catalog;
-use crate::error::{PipelineError, Place};
+use crate::error::{PipelineError, PipelineErrorKind, Place};
 use crate::fields::Spot;
 use crate::limits::PipelineLimits;
 use crate::value::set;
@@ -39,13 +39,15 @@ impl PipelineFile {
     ///
     /// # Errors
     ///
-    /// [`PipelineError::Read`] if the file cannot be read, is not a regular file, or has more than
-    /// 1 MiB.
+    /// [`PipelineErrorKind::Read`] if the file cannot be read, is not a regular file, or has more
+    /// than 1 MiB.
     pub fn read_text(path: impl AsRef<Path>) -> Result<String, PipelineError> {
         let path = path.as_ref();
-        read_small_file(path).map_err(|source| PipelineError::Read {
-            path: path.to_owned(),
-            source,
+        read_small_file(path).map_err(|source| PipelineError {
+            kind: PipelineErrorKind::Read,
+            place: Place::of(&path.to_string_lossy(), "", None, ""),
+            problem: "cannot be read".to_owned(),
+            source: Some(source),
         })
     }
 
@@ -53,7 +55,7 @@ impl PipelineFile {
     ///
     /// # Errors
     ///
-    /// [`PipelineError::Syntax`] if it is not TOML.
+    /// [`PipelineErrorKind::Syntax`] if it is not TOML.
     pub fn parse(text: &str, origin: &str) -> Result<Self, PipelineError> {
         let file = Self {
             text: text.to_owned(),
@@ -71,8 +73,8 @@ impl PipelineFile {
     ///
     /// # Errors
     ///
-    /// [`PipelineError::Override`] if the path leads nowhere. Whether a part has such a field is
-    /// checked by building.
+    /// [`PipelineErrorKind::Override`] if the path leads nowhere. Whether a part has such a field
+    /// is checked by building.
     pub fn set(&mut self, assignment: &str) -> Result<(), PipelineError> {
         self.overrides.push(assignment.to_owned());
         let outcome = self.root().map(|_| ());
@@ -87,7 +89,7 @@ impl PipelineFile {
     /// # Errors
     ///
     /// [`PipelineError`] with the line, the field, the value found and what was expected;
-    /// [`PipelineError::Limit`] above [`PipelineLimits::DEFAULT`].
+    /// [`PipelineErrorKind::Limit`] above [`PipelineLimits::DEFAULT`].
     pub fn build(&self) -> Result<BoxedStage, PipelineError> {
         self.build_within(&PipelineLimits::DEFAULT)
     }
@@ -128,14 +130,11 @@ impl PipelineFile {
 
     /// Parses the text and applies the overrides.
     fn root(&self) -> Result<Spanned<DeValue<'_>>, PipelineError> {
-        let table = DeTable::parse(&self.text).map_err(|error| PipelineError::Syntax {
-            place: Place::of(
-                &self.origin,
-                &self.text,
-                error.span().map(|span| span.start),
-                "",
-            ),
-            message: error.message().to_owned(),
+        let table = DeTable::parse(&self.text).map_err(|error| {
+            let start = error.span().map(|span| span.start);
+            let place = Place::of(&self.origin, &self.text, start, "");
+            let problem = format!("not TOML: {}", error.message());
+            PipelineError::new(PipelineErrorKind::Syntax, place, problem)
         })?;
         let mut root = Spanned::new(table.span(), DeValue::Table(table.into_inner()));
         for assignment in &self.overrides {

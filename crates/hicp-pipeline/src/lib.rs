@@ -52,7 +52,7 @@ pub use catalog::{
     BoxedAssociation, BoxedFilter, BoxedMetric, BoxedScore, BoxedSelection, BoxedStop,
     BoxedSwitcher, Catalog,
 };
-pub use error::{PipelineError, Place};
+pub use error::{PipelineError, PipelineErrorKind, Place};
 pub use file::PipelineFile;
 pub use kind::{BoxedPart, PartKind};
 pub use limits::PipelineLimits;

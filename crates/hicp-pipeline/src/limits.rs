@@ -1,7 +1,7 @@
 //! Limits on the work that a pipeline file may request.
 
 /// The work that a pipeline file may request before it is refused with
-/// [`PipelineError::Limit`](crate::PipelineError::Limit).
+/// [`PipelineErrorKind::Limit`](crate::PipelineErrorKind::Limit).
 ///
 /// A file can come from anywhere, and a few words of it can request years of work. The defaults are
 /// more than a hundred times what any preset needs in the worst case.

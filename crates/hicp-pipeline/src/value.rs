@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::error::PipelineError;
+use crate::error::{PipelineError, PipelineErrorKind, Place};
 
 /// The position of a value that an override set, which has no place in the file.
 pub(crate) const NOWHERE: usize = usize::MAX;
@@ -56,9 +56,9 @@ pub(crate) fn set<'a>(
     root: &mut Spanned<DeValue<'a>>,
     assignment: &'a str,
 ) -> Result<(), PipelineError> {
-    let refuse = |problem: String| PipelineError::Override {
-        assignment: assignment.to_owned(),
-        problem,
+    let refuse = |problem: String| {
+        let place = Place::of(&format!("override {assignment:?}"), "", None, "");
+        PipelineError::new(PipelineErrorKind::Override, place, problem)
     };
     let Some((path, value)) = assignment.split_once('=') else {
         return Err(refuse("expected path=value".to_owned()));

@@ -3,7 +3,7 @@
 use toml::de::DeValue;
 
 use crate::build::Parameters;
-use crate::error::PipelineError;
+use crate::error::{PipelineError, PipelineErrorKind};
 use crate::limits::PipelineLimits;
 
 /// Counts that [`PipelineLimits`] bound.
@@ -85,14 +85,14 @@ impl Parameters<'_> {
             return Ok(());
         };
         let (found, spot) = fields.field(field);
-        Err(PipelineError::Limit {
-            place: spot.place(context.origin, context.text),
-            found: match found {
-                Some(DeValue::Integer(number)) => format!("{number}, {what}"),
-                _ => what,
-            },
-            limit,
-            field: limit_field,
-        })
+        let found = match found {
+            Some(DeValue::Integer(number)) => format!("{number}, {what}"),
+            _ => what,
+        };
+        let option = limit_field.replace('_', "-");
+        let problem = format!(
+            "found {found}, expected at most {limit}: raise the limit (--{option} N, PipelineLimits::{limit_field}) if that is meant"
+        );
+        Err(context.error(PipelineErrorKind::Limit, &spot, problem))
     }
 }
