@@ -287,10 +287,9 @@ fn many_values(
         let Ok(selected) = Observation::new(depth, mask, *observation.camera()) else {
             continue;
         };
-        let handicap = if matches!(rule, MaskRule::Equal(_)) {
-            0.0
-        } else {
-            CLEAR
+        let handicap = match rule {
+            MaskRule::Equal(_) => 0.0,
+            _ => CLEAR,
         };
         let mve = refiner.mve(model, &selected, init) + handicap;
         if best.as_ref().is_none_or(|(least, ..)| mve < *least) {
@@ -301,18 +300,12 @@ fn many_values(
         return Ok(None);
     };
     let (name, kind, option) = match rule {
-        MaskRule::Equal(value) if value < MaskRule::COLOR => (
-            "mask_labels",
-            "a label image",
-            format!("--mask-value {value}"),
-        ),
         MaskRule::Equal(value) => {
-            let color = value - MaskRule::COLOR;
-            (
-                "mask_labels",
-                "a label image",
-                format!("--mask-value '#{:06x}'", color as u32),
-            )
+            let option = match value - MaskRule::COLOR {
+                color if color >= 0.0 => format!("--mask-value '#{:06x}'", color as u32),
+                _ => format!("--mask-value {value}"),
+            };
+            ("mask_labels", "a label image", option)
         }
         _ => ("mask_soft", "soft", format!("--mask-threshold {threshold}")),
     };

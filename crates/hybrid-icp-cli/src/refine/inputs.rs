@@ -183,12 +183,8 @@ fn bbox(text: &str) -> Result<Bbox, String> {
         .collect();
     let bbox: Option<Bbox> = numbers.ok().and_then(|numbers| numbers.try_into().ok());
     bbox.filter(|[x, y, width, height]| {
-        x.is_finite()
-            && y.is_finite()
-            && width.is_finite()
-            && height.is_finite()
-            && *width >= 1.0
-            && *height >= 1.0
+        let is_finite = [x, y, width, height].iter().all(|n| n.is_finite());
+        is_finite && *width >= 1.0 && *height >= 1.0
     })
     .ok_or_else(|| {
         "expected x,y,width,height in pixels, with a width and height of 1 or more".to_owned()
@@ -250,13 +246,12 @@ impl Inputs {
         let files = &self.files;
         let depth = limits.read_raw_depth(&files.depth)?;
         let (depth_size, mut warnings) = (depth.size(), Vec::new());
-        let depth_camera = match &files.depth_camera {
-            Some(path) => Some(read_camera(path, depth_size, &files.depth)?),
-            None => None,
-        };
+        let read_other = |path: &PathBuf| read_camera(path, depth_size, &files.depth);
+        let depth_camera = files.depth_camera.as_ref().map(read_other).transpose()?;
         let region = &self.region;
-        let (file_mask, bbox) = match (&region.mask, region.bbox.unwrap_or_default()) {
-            (Some(path), _) => {
+        let bbox = region.bbox.unwrap_or_default();
+        let file_mask = match &region.mask {
+            Some(path) => {
                 let read = limits.read_mask(path, region.mask_options.rule())?;
                 let MaskFile { mask, warning, .. } = read;
                 let (width, height) = (mask.width(), mask.height());
@@ -269,9 +264,9 @@ impl Inputs {
                     );
                 }
                 warnings.extend(warning.map(|text| format!("{}: {text}", path.display())));
-                (Some(mask), [0.0; 4])
+                Some(mask)
             }
-            (None, bbox) => {
+            None => {
                 let ([x, y, width, height], (w, h)) = (bbox, depth_size);
                 if !box_overlaps(bbox, depth_size) {
                     bail!(
@@ -282,7 +277,7 @@ impl Inputs {
                 let warning = warning_of_box(bbox, depth_size);
                 warnings
                     .extend(warning.map(|text| format!("--bbox {x},{y},{width},{height}: {text}")));
-                (None, bbox)
+                None
             }
         };
         let (size, sized) = match (&file_mask, &region.mask) {
@@ -344,13 +339,12 @@ impl Inputs {
             warnings.extend(warning.map(text));
         }
         let color = rgb.map(|path| colors::read_image(path, &of_mask, &files.camera));
+        let init = self.init.as_ref();
+        let init = init.map(|path| limits.read_pose(path, self.init_unit));
         Ok(Read {
             mask,
             color: color.transpose()?,
-            init: match &self.init {
-                Some(path) => Some(limits.read_pose(path, self.init_unit)?),
-                None => None,
-            },
+            init: init.transpose()?,
             model,
             depth,
             camera,
