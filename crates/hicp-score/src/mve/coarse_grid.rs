@@ -1,30 +1,22 @@
 //! A coarse depth image, for scores at low resolution.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use hicp_core::internal::{VectorLoop, median, whole};
-use hicp_core::{Derived, Observation, PixelRegion};
+use hicp_core::{DepthImage, Derived, Observation, PinholeCamera, PixelRegion};
 
 use crate::mve::agreement::all_bits;
 use crate::mve::trust_map::{CERTAIN, TrustMap};
 use crate::tolerances::N_TOLERANCES;
 
-/// Number of zeros after the last pixel, for loops over many pixels at once.
+/// Number of zeros after each row, for loops over many pixels at once.
 pub(crate) const PADDING: usize = 8;
 
 /// Every few pixels of an observation, without most of the noise.
-///
-/// Each of the three lists is row-major and ends with [`PADDING`] zeros.
 pub(crate) struct CoarseGrid {
     /// The camera of the coarse image.
-    pub(crate) camera: hicp_core::PinholeCamera,
-    /// Meters; 0 without a measured depth.
-    pub(crate) measured: Vec<f32>,
-    /// The certainty that a pixel shows the object, at most [`CoarseGrid::one`].
-    pub(crate) weight: Vec<u32>,
-    /// Distance from the camera divided by the depth.
-    pub(crate) distance_per_depth: Vec<f32>,
+    pub(crate) camera: PinholeCamera,
     /// The weight of a pixel that certainly shows the object.
     pub(crate) one: u32,
     /// The sum of the weights of measured pixels.
@@ -32,6 +24,23 @@ pub(crate) struct CoarseGrid {
     /// The distance behind the rendered surface from which on the camera sees through it; `None`
     /// for an exact mask.
     pub(crate) seen_through_meters: Option<f64>,
+    depth: Arc<DepthImage>,
+    factor: u32,
+    /// The coarse region outside which weights are 0, with the depth and the weight of its pixels.
+    region: PixelRegion,
+    inside: Vec<(f32, u32)>,
+    /// The rows that a score has read.
+    rows: Vec<OnceLock<Row>>,
+}
+
+/// A row of a grid. Each list ends with [`PADDING`] zeros.
+pub(crate) struct Row {
+    /// Meters; 0 without a measured depth.
+    measured: Vec<f32>,
+    /// The certainty that a pixel shows the object, at most [`CoarseGrid::one`].
+    weight: Vec<u32>,
+    /// Distance from the camera divided by the depth.
+    distance_per_depth: Vec<f32>,
 }
 
 /// The grids of an observation at one resolution.
@@ -47,7 +56,8 @@ impl CoarseGrid {
     /// Returns the grid of every `factor`-th pixel of every `factor`-th row, from pixel (0, 0).
     ///
     /// `imperfect` is the diameter of the object in meters if the mask is imperfect. The grid is
-    /// built once and shared. Cost: O(image / factor²).
+    /// built once and shared. Cost: O(pixels of the mask's box), then O(width) for each row that is
+    /// read for the first time.
     pub(crate) fn of(fine: &Observation, factor: u32, imperfect: Option<f64>) -> Arc<Self> {
         let grids: Arc<Grids> = fine.derived().get_or_build(factor.into(), Grids::default);
         // No diameter has the key of an exact mask.
@@ -76,46 +86,78 @@ impl CoarseGrid {
         weight: impl Fn((u32, u32), bool) -> u32,
     ) -> Self {
         let camera = fine.camera().scaled_down(factor);
-        let (width, height) = camera.size();
-        let length = width as usize * height as usize + PADDING;
-        let mut measured = Vec::with_capacity(length);
-        measured.extend_from_slice(fine.depth().decimated(factor).pixels());
-        let mut distance_per_depth = Vec::with_capacity(length);
-        // `PinholeCamera::distance_per_depth`, with one division per row and column.
-        let squared = |pixel: u32, center: f64, focal_length: f64| {
-            let slope = (f64::from(pixel) - center) / focal_length;
-            slope * slope
-        };
-        let x = (0..width).map(|u| squared(u, camera.cx(), camera.fx()));
-        let x: Vec<f64> = x.collect();
-        for v in 0..height {
-            let y = squared(v, camera.cy(), camera.fy());
-            #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
-            distance_per_depth.extend(x.iter().map(|x| (x + y + 1.0).sqrt() as f32));
-        }
-        measured.resize(length, 0.0);
-        distance_per_depth.resize(length, 0.0);
-        let (mut weights, mut total) = (vec![0; length], 0);
-        for (u, v) in region.decimated(factor).pixels() {
-            let (place, index) = ((u * factor, v * factor), (v * width + u) as usize);
-            let masked = fine.mask().get(place.0, place.1) == Some(true);
-            weights[index] = weight(place, masked);
-            if measured[index] > 0.0 {
-                total += u64::from(weights[index]);
+        let region = region.decimated(factor);
+        let mut total = 0;
+        let pixel = |(u, v): (u32, u32)| {
+            let (u, v) = (u * factor, v * factor);
+            let masked = fine.mask().get(u, v) == Some(true);
+            let weight = weight((u, v), masked);
+            let mut measured = fine.depth().get(u, v).unwrap_or(0.0);
+            if measured > 0.0 {
+                total += u64::from(weight);
                 if masked && factor > 1 {
-                    measured[index] = median_around(fine, place, factor);
+                    measured = median_around(fine, (u, v), factor);
                 }
             }
-        }
+            (measured, weight)
+        };
+        let inside = region.pixels().map(pixel).collect();
         Self {
             camera,
-            measured,
-            weight: weights,
-            distance_per_depth,
             one: 1,
             total,
             seen_through_meters: None,
+            depth: Arc::clone(fine.shared_depth()),
+            factor,
+            region,
+            inside,
+            rows: (0..camera.height()).map(|_| OnceLock::new()).collect(),
         }
+    }
+
+    /// Number of pixels from one row of a buffer to the next.
+    pub(crate) fn stride(&self) -> usize {
+        self.camera.width() as usize + PADDING
+    }
+
+    /// Returns a row.
+    #[inline]
+    fn row(&self, v: usize) -> &Row {
+        self.rows[v].get_or_init(|| self.new_row(v))
+    }
+
+    #[cold]
+    fn new_row(&self, v: usize) -> Row {
+        let (camera, region) = (&self.camera, &self.region);
+        let squared = |pixel: usize, center: f64, focal_length: f64| {
+            let slope = (pixel as f64 - center) / focal_length;
+            slope * slope
+        };
+        let y = squared(v, camera.cy(), camera.fy());
+        // `PinholeCamera::distance_per_depth`.
+        let distance = |u| (squared(u, camera.cx(), camera.fx()) + y + 1.0).sqrt();
+        let width = camera.width() as usize;
+        let fine = self.depth.width() as usize;
+        let first = v * self.factor as usize * fine;
+        let depths = self.depth.pixels()[first..first + fine].iter();
+        let mut row = Row {
+            measured: depths.step_by(self.factor as usize).copied().collect(),
+            weight: vec![0; width],
+            #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
+            distance_per_depth: (0..width).map(|u| distance(u) as f32).collect(),
+        };
+        if (region.v_min as usize..region.v_max as usize).contains(&v) {
+            let start = (v - region.v_min as usize) * region.width();
+            for (u, (measured, weight)) in
+                (region.u_min as usize..).zip(&self.inside[start..start + region.width()])
+            {
+                (row.measured[u], row.weight[u]) = (*measured, *weight);
+            }
+        }
+        row.measured.resize(self.stride(), 0.0);
+        row.weight.resize(self.stride(), 0);
+        row.distance_per_depth.resize(self.stride(), 0.0);
+        row
     }
 }
 
@@ -152,10 +194,10 @@ const MOST_PIXELS: usize = 1 << 20;
 /// pixels outside the mask lack.
 pub(crate) struct CompareCoarse<'a> {
     pub(crate) grid: &'a CoarseGrid,
-    pub(crate) image_width: usize,
     /// The columns and rows that contain the touched pixels.
     pub(crate) touched: [Range<usize>; 2],
-    /// Inverse depths, 0 for a pixel that is not touched. It has the length of the grid's lists.
+    /// Inverse depths, 0 for a pixel that is not touched. Its rows are a [`CoarseGrid::stride`]
+    /// apart.
     pub(crate) buffer: &'a mut [f32],
     /// Tolerances per meter.
     pub(crate) per_meter: f32,
@@ -175,17 +217,16 @@ impl VectorLoop for CompareCoarse<'_> {
         let (mut all_agree, mut all_outside) = (0, 0);
         let (mut agreement, mut outside) = ([0_u32; LANES], [0_u32; LANES]);
         let mut pixels = 0;
-        for row in rows {
-            // The last pixels may be in the next row, or in the padding. A pixel counts once,
-            // because it is cleared.
-            for column in columns.clone().step_by(LANES) {
-                let first = row * self.image_width + column;
+        for v in rows {
+            let row = grid.row(v);
+            for u in columns.clone().step_by(LANES) {
+                let first = v * grid.stride() + u;
                 let Some(buffer) = self.buffer[first..].first_chunk_mut::<LANES>() else {
                     unreachable!("the buffer is padded")
                 };
                 let inverse = std::mem::replace(buffer, [0.0; LANES]);
-                let (measured, weight) = (lanes(&grid.measured, first), lanes(&grid.weight, first));
-                let distance_per_depth = lanes(&grid.distance_per_depth, first);
+                let (measured, weight) = (lanes(&row.measured, u), lanes(&row.weight, u));
+                let distance_per_depth = lanes(&row.distance_per_depth, u);
                 for lane in 0..LANES {
                     let behind = (1.0 / inverse[lane] - measured[lane]) * distance_per_depth[lane];
                     let touched = all_bits(inverse[lane] > 0.0);

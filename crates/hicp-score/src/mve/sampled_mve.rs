@@ -3,7 +3,7 @@
 use hicp_core::internal::vectorized;
 use hicp_core::{Context, Isometry3, Observation, Problem};
 
-use crate::mve::coarse_grid::{CoarseGrid, CompareCoarse};
+use crate::mve::coarse_grid::{CoarseGrid, CompareCoarse, PADDING};
 use crate::mve::mask_trust::MaskTrust;
 use crate::mve::occlusion::Occlusion;
 use crate::mve::splat::{Block, Blocks, Drawn, Splat};
@@ -91,12 +91,14 @@ impl SampledMve {
         pose: &Isometry3<f64>,
         diameter: f64,
     ) -> f64 {
-        if self.buffer.len() < grid.measured.len() {
-            self.buffer.resize(grid.measured.len(), 0.0);
+        let length = grid.stride() * grid.camera.height() as usize + PADDING;
+        if self.buffer.len() < length {
+            self.buffer.resize(length, 0.0);
         }
         let touched = vectorized(Splat {
             blocks,
             camera: &grid.camera,
+            stride: grid.stride(),
             pose,
             buffer: &mut self.buffer,
             drawn: &mut self.drawn,
@@ -110,7 +112,6 @@ impl SampledMve {
         let (per_meter, hidden_beyond) = ((20.0 / diameter) as f32, hidden_beyond as f32);
         let (agreement, outside) = vectorized(CompareCoarse {
             touched,
-            image_width: grid.camera.width() as usize,
             buffer: &mut self.buffer,
             grid,
             per_meter,

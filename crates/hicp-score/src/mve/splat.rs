@@ -105,8 +105,10 @@ impl Extent {
 pub(crate) struct Splat<'a> {
     pub(crate) blocks: &'a [Block],
     pub(crate) camera: &'a PinholeCamera,
+    /// Number of pixels from one row of the buffer to the next.
+    pub(crate) stride: usize,
     pub(crate) pose: &'a Isometry3<f64>,
-    /// The pixels of the image, and [`PADDING`] more.
+    /// The rows of the image, and [`PADDING`] more pixels.
     pub(crate) buffer: &'a mut [f32],
     /// Scratch memory.
     pub(crate) drawn: &'a mut Vec<Drawn>,
@@ -122,7 +124,7 @@ impl VectorLoop for Splat<'_> {
         let [fx, fy, cx, cy] =
             [camera.fx(), camera.fy(), camera.cx(), camera.cy()].map(|value| value as f32);
         let (width, height) = (camera.width() as f32, camera.height() as f32);
-        let stride = camera.width();
+        let stride = self.stride as u32;
         let (mut columns, mut rows) = (Extent::EMPTY, Extent::EMPTY);
         let pose: Isometry3<f32> = self.pose.cast();
         let rotation = pose.rotation.to_rotation_matrix();
