@@ -73,7 +73,8 @@ impl Prior {
 /// σ (`sigma_meters`) is the standard deviation of a residual of weight 1. It gives both terms the
 /// unit m², and 1/σ² times the sum is the negative log posterior. N residuals count as N
 /// independent ones, which neighboring pixels are not. To give the prior its full influence,
-/// multiply σ by √(pixels per independent residual).
+/// multiply σ by √(pixels per independent residual). The covariance of the system is that of the
+/// posterior at this σ, whatever the residuals are. Of nested priors, the outer one sets σ.
 ///
 /// The prior is linearized with the inverse left Jacobian (Barfoot & Furgale 2014): ξ + 𝓙(ξ)⁻¹ δ.
 /// The step is that of Gauss–Newton, even for metrics with a closed form. Without information, it
@@ -146,6 +147,7 @@ impl<M: Minimize> Minimize for PosePrior<M> {
         let mut system = self.metric.system(iteration, pairs)?;
         if let Some((error, information)) = self.term(iteration, pairs) {
             system.add_twist(&error, &se3::left_jacobian_inverse(&error), &information);
+            system = system.with_variance(self.sigma_meters.powi(2));
         }
         Some(system)
     }

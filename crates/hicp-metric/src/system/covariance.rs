@@ -36,10 +36,11 @@ impl NormalEquations {
     /// Returns the covariance Σ = s² (JᵀWJ)⁻¹ of ξ = [ρ; φ], with s² = Σ w r²/(N − 6).
     ///
     /// N is the number of rows of positive weight. Frame and order are those of
-    /// [`NormalEquations::information`]. If components are frozen ([`NormalEquations::freeze`]),
-    /// they have no variance, and N minus the number of free components replaces N − 6. Returns
-    /// `None` if the rows do not determine all free components, if no row is left over, or if a
-    /// number is not finite.
+    /// [`NormalEquations::information`]. A known variance ([`NormalEquations::with_variance`])
+    /// replaces s². If components are frozen ([`NormalEquations::freeze`]), they have no variance,
+    /// and N minus the number of free components replaces N − 6. Returns `None` if the rows do not
+    /// determine all free components, if a number is not finite, or if no row is left over to
+    /// estimate an unknown variance.
     ///
     /// It is valid at the pose that minimizes the loss, for right pairs and independent residuals
     /// whose variances are inversely proportional to their weights. It does not contain wrong pairs
@@ -61,10 +62,12 @@ impl NormalEquations {
     /// hicp-tests --example nees_report 300` reproduces these figures.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
-        let n_free = self.n_free();
-        let spare = self.rows.checked_sub(n_free).filter(|spare| *spare > 0)?;
-        #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
-        let variance = self.loss() / spare as f64;
+        let variance = self.variance.or_else(|| {
+            let spare = self.rows.checked_sub(self.n_free());
+            #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
+            let spare = spare.filter(|spare| *spare > 0)? as f64;
+            Some(self.loss() / spare)
+        })?;
         let (mut reduced, _) = self.reduced(&self.scaled_hessian());
         self.fill_held(&mut reduced);
         let eigenvalues = eigen(reduced)?.eigenvalues;

@@ -26,6 +26,8 @@ pub struct NormalEquations {
     /// Σ w over the pairs, if [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all)
     /// summed the system.
     pub(crate) weight: Option<f64>,
+    /// Variance of a residual of weight 1, if it is known instead of estimated.
+    pub(crate) variance: Option<f64>,
     sums: RowSums,
     pub(crate) rows: usize,
     /// Trace of the rows alone, if a prior was added: its stiffness must not raise the damping.
@@ -47,6 +49,7 @@ impl NormalEquations {
             length,
             inverse_length: 1.0 / length,
             weight: None,
+            variance: None,
             sums: RowSums::zeros(),
             rows: 0,
             row_trace: None,
@@ -121,6 +124,16 @@ impl NormalEquations {
         self.rows
     }
 
+    /// Sets the variance of a residual of weight 1, which scales [`NormalEquations::covariance`].
+    ///
+    /// Without it, the residuals estimate the variance. A prior needs it: its share of the system
+    /// is right for one variance only.
+    #[must_use]
+    pub fn with_variance(mut self, variance: f64) -> Self {
+        self.variance = Some(variance);
+        self
+    }
+
     /// Returns Σ w r², the weighted sum of squared residuals at the identity increment.
     #[must_use]
     pub fn loss(&self) -> f64 {
@@ -144,7 +157,8 @@ impl NormalEquations {
     /// ξ is the twist around the *camera origin* in meters and radians. Λ (`information`) is
     /// symmetric and positive semi-definite, and eᵀΛe has the unit of the loss. Each component with
     /// information counts as a row. Add it after the rows, because they alone determine the damping
-    /// of [`NormalEquations::solve`].
+    /// of [`NormalEquations::solve`]. If Λ is σ² times the information of a prior, also set the
+    /// variance σ² ([`NormalEquations::with_variance`]).
     pub fn add_twist(
         &mut self,
         residual: &Vector6<f64>,
@@ -165,7 +179,8 @@ impl NormalEquations {
 
     /// Adds `factor` times another system, whose pivot and length may differ.
     ///
-    /// Policy and frozen components stay those of `self`.
+    /// Policy and frozen components stay those of `self`, and so does a known variance. If only the
+    /// other variance is known, it is multiplied by the factor.
     pub fn merge(&mut self, other: &Self, factor: f64) {
         // The same twist in the other system's unknowns: ρ' = ρ + φ × (pivot' − pivot), θ' = θ
         // L'/L.
@@ -183,13 +198,16 @@ impl NormalEquations {
             factor * other.loss(),
         );
         self.rows += other.rows;
+        let variance = other.variance.map(|variance| variance * factor);
+        self.variance = self.variance.or(variance);
     }
 
-    /// Multiplies every weight by a factor.
+    /// Multiplies every weight, and with them a known variance of the residuals, by a factor.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         self.sums.scale(factor);
         self.weight = None;
+        self.variance = self.variance.map(|variance| variance * factor);
         self.row_trace = self.row_trace.map(|trace| trace * factor);
         self
     }

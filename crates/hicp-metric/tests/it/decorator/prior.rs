@@ -1,10 +1,14 @@
 //! Tests of the prior and its limits.
 
-use crate::scenes::{Numbers, at, center, difference, messy};
+use crate::scenes::{Numbers, at, center, difference, messy, surfel};
 use hicp_core::Iteration;
-use hicp_core::{Correspondences, Isometry3, Matrix6, Point3, Problem, Vector6, se3};
+use hicp_core::{
+    Correspondences, Isometry3, Matrix6, Pair, Point3, Problem, Vector3, Vector6, se3,
+};
 use hicp_metric::Minimize;
-use hicp_metric::{GaussNewton, PointToPlane, PointToPoint, PosePrior, Prior, Robust};
+use hicp_metric::{
+    GaussNewton, NormalEquations, PointToPlane, PointToPoint, PosePrior, Prior, Robust, WeightedSum,
+};
 
 fn posed(numbers: &mut Numbers, count: usize) -> Correspondences {
     let pose =
@@ -272,4 +276,65 @@ fn a_prior_around_the_initial_pose() {
         metric.minimize(&at(7, &pose), &pairs),
         fresh.minimize(&at(0, &pose), &pairs)
     );
+}
+
+/// Along directions that only the prior determines, the covariance is that of the prior, for every
+/// size of the residuals.
+#[test]
+fn residuals_do_not_scale_the_covariance_of_a_prior() {
+    let pose = Isometry3::translation(0.0, 0.0, 0.5);
+    let iteration = Iteration::new(0, &pose, Problem::default());
+    let prior = Prior::AboutInitial {
+        translation_meters: 0.005,
+        rotation_degrees: 5.0,
+    };
+    for noise in [1e-4, 1e-3, 1e-2] {
+        let mut numbers = Numbers(69);
+        let plane: Correspondences = (0..200)
+            .map(|i| {
+                let (x, y) = (numbers.sign() * 0.05, numbers.sign() * 0.05);
+                let at = |z| surfel(Point3::new(x, y, z), -Vector3::z());
+                Pair::new(i, at(0.5), i, at(0.5 + noise * numbers.gaussian()))
+            })
+            .collect();
+        let pairs = at(&pose, &plane);
+        let mut metric = PosePrior::new(PointToPlane, prior, 1e-3);
+        let system = metric.system(&iteration, &pairs).unwrap();
+        // Around the object's origin instead of the camera's.
+        let adjoint = se3::adjoint(&pose.inverse());
+        let found = adjoint * system.covariance().unwrap() * adjoint.transpose();
+        for (i, sigma) in [(0, 0.005), (1, 0.005), (5, 5_f64.to_radians())] {
+            let found = found[(i, i)].sqrt();
+            assert!(
+                (found - sigma).abs() < 1e-5 * sigma,
+                "{noise}: {found} instead of {sigma}"
+            );
+        }
+    }
+}
+
+/// Σ⁻¹ = JᵀWJ/σ² + Λ, also if a sum of metrics scales or joins the systems.
+#[test]
+fn the_covariance_is_that_of_the_posterior() {
+    let mut numbers = Numbers(70);
+    let pairs = posed(&mut numbers, 80);
+    let information = random_information(&mut numbers, 1e5);
+    let mut metric = prior(PointToPlane, pairs.camera_from_object(), information);
+    metric.sigma_meters = 2e-3;
+    let system = |metric: &mut dyn Minimize| metric.system(&Iteration::default(), &pairs).unwrap();
+    let data = system(&mut PointToPlane).information();
+    let both = data + system(&mut PointToPoint).information();
+    let check = |system: NormalEquations, data: Matrix6<f64>| {
+        let product = system.covariance().unwrap() * (data / 4e-6 + information);
+        let difference = (product - Matrix6::identity()).amax();
+        assert!(difference < 1e-8, "{difference}");
+    };
+    check(system(&mut metric), data);
+    // Weights that count a quarter have a σ of one half, for equal standard deviations.
+    let terms = ((0.25, metric),);
+    check(system(&mut WeightedSum { terms }), data);
+    let terms = ((0.25, metric), (0.25, PointToPoint));
+    check(system(&mut WeightedSum { terms }), both);
+    let terms = ((0.25, PointToPoint), (0.25, metric));
+    check(system(&mut WeightedSum { terms }), both);
 }
