@@ -2,9 +2,9 @@
 
 use hicp_core::{Point3, UnitQuaternion};
 
-/// The free components of the increment y = [δ; θ].
+/// The frozen components of the increment [δ; φ].
 ///
-/// δ is the displacement of a center and θ = L φ the scaled rotation, both along given axes.
+/// δ is the displacement of a center and φ the rotation around it, both along given axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Freedom {
     pub(crate) axes: UnitQuaternion<f64>,

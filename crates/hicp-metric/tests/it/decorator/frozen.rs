@@ -1,12 +1,12 @@
 //! Tests that frozen components are exactly zero, and that the rest is the constrained minimum.
 
-use crate::scenes::{Numbers, at, difference, exact, messy};
+use crate::scenes::{Numbers, at, center, difference, exact, messy, surfel};
 use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Point3, Vector3, Vector6, se3, so3};
 use hicp_metric::Minimize;
 use hicp_metric::{
-    Conditioned, Frame, Frozen, GaussNewton, LevenbergMarquardt, PointToPlane, PointToPoint,
-    Symmetric,
+    Conditioned, Degeneracy, Frame, Frozen, GaussNewton, LevenbergMarquardt, PointToPlane,
+    PointToPoint, Symmetric,
 };
 
 /// Returns the displacement of the object's origin and the rotation vector, in the axes of the
@@ -297,4 +297,78 @@ fn solvers_and_policies_respect_frozen_components() {
     assert!(variance > 0.0);
     assert!((block - direction * direction.transpose() * variance).amax() < 1e-12 * variance);
     assert!(covariance.fixed_view::<3, 3>(3, 3).amax() < 1e-30);
+}
+
+/// Returns pairs of a box at the center of the scene, half a meter from the camera, and their
+/// images under a rotation by an angle and a shift as large at 10 cm.
+fn boxed(angle: f64) -> Correspondences {
+    let mut numbers = Numbers(58);
+    let sides = Vector3::new(0.05, 0.03, 0.04);
+    let source: Vec<_> = (0..300)
+        .map(|i| {
+            let mut normal = Vector3::zeros();
+            normal[i % 3] = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let mut offset = numbers.vector().component_mul(&sides);
+            offset[i % 3] = normal[i % 3] * sides[i % 3];
+            surfel(center() + offset, normal)
+        })
+        .collect();
+    let motion = Isometry3::translation(0.04 * angle, -0.03 * angle, 0.02 * angle)
+        * Isometry3::rotation_wrt_point(so3::exp(&(Vector3::new(0.8, 0.5, 0.3) * angle)), center());
+    exact(&source, &motion)
+}
+
+const POLICIES: [Degeneracy; 4] = [
+    Degeneracy::Damp,
+    Degeneracy::Freeze,
+    Degeneracy::FreezeRotations,
+    Degeneracy::Refuse,
+];
+
+/// Checks that steps and covariances are the same for origins of the object along an axis.
+fn same_for_all_origins(mask: ([bool; 3], [bool; 3]), pairs: &Correspondences, tolerance: f64) {
+    let origins = [0.0, 0.36, 10.0].map(|meters| center().coords + Vector3::x() * meters);
+    for policy in POLICIES {
+        let found = origins.map(|origin| {
+            let pose = Isometry3::translation(origin.x, origin.y, origin.z);
+            let pairs = at(&pose, pairs);
+            let metric = Conditioned {
+                metric: PointToPlane,
+                policy,
+                ..Conditioned::default()
+            };
+            let system = frozen(metric, Frame::Camera, mask)
+                .system(&Iteration::default(), &pairs)
+                .unwrap();
+            (system.solve().unwrap(), system.covariance().unwrap())
+        });
+        for (step, covariance) in &found[1..] {
+            let (angle, _) = difference(step, &found[0].0);
+            let distance = (step * center() - found[0].0 * center()).norm();
+            let size = found[0].0.rotation.angle();
+            assert!(size > 0.0);
+            assert!(
+                angle < 1e-6 * size && distance < tolerance,
+                "{mask:?} {policy:?}: {angle} and {distance} m of {size}"
+            );
+            assert!((covariance - found[0].1).amax() < 1e-6 * covariance.amax());
+        }
+    }
+}
+
+/// A frozen rotation around a parallel axis is the same constraint.
+#[test]
+fn a_frozen_rotation_does_not_depend_on_the_objects_origin() {
+    for rotation in [[false, false, true], [true, false, true]] {
+        same_for_all_origins(([false; 3], rotation), &boxed(0.02), 1e-9);
+    }
+}
+
+/// To first order, a displacement along an axis is the same for all points of a line along it.
+#[test]
+fn a_frozen_translation_does_not_depend_on_the_place_along_its_axis() {
+    for rotation in [[false; 3], [true, false, false], [false, false, true]] {
+        // The square of the rotation times 10 m, where points move by 1e-7 m.
+        same_for_all_origins(([true, false, false], rotation), &boxed(1e-6), 1e-11);
+    }
 }
