@@ -3,7 +3,7 @@
 use hybrid_icp::core::{
     Correspondences, Isometry3, Iteration, Pair, Problem, RigidTransform, Surfel, Vector3, se3,
 };
-use hybrid_icp::metric::{ErrorMetric, Minimize, NormalEquations, Step};
+use hybrid_icp::metric::{ErrorMetric, Minimize, NO_ROWS, NormalEquations, Step};
 
 use crate::law::{Subject, Trial};
 use crate::pairs::{good_pairs, hard_pairs};
@@ -27,7 +27,7 @@ pub struct MetricLaws {
     pub multiplicity: bool,
     /// A tenth of the increment does not raise the mean loss.
     pub downhill: bool,
-    /// `squared_error` is the sum of the squared rows of `linearize`.
+    /// `squared_error` is the sum of the squared rows of `linearize`, and `NO_ROWS` without rows.
     pub rows: bool,
 }
 
@@ -143,7 +143,7 @@ struct Answers {
 
 impl Answers {
     fn of(metric: &mut dyn Minimize, iteration: &Iteration<'_>, pairs: &Correspondences) -> Self {
-        let mut squared_errors = vec![0.0; pairs.len()];
+        let mut squared_errors = vec![NO_ROWS; pairs.len()];
         metric.add_squared_errors(iteration, pairs, 1.0, &mut squared_errors);
         Self {
             squared_errors,
@@ -306,6 +306,14 @@ fn rows(trial: &Trial<'_>, metric: &dyn ErrorMetric, pairs: &Correspondences) {
         for weight in [1.0, 2.0] {
             let mut rows = NormalEquations::new(pair.source.point.cast(), 1.0);
             metric.linearize(&Pair { weight, ..*pair }, &mut rows);
+            trial.holds(
+                "squared_error is NO_ROWS if and only if the pair adds no row",
+                (error.to_bits() == NO_ROWS.to_bits()) == (rows.rows() == 0),
+                format_args!(
+                    "{} rows, a squared error of {error:?}, for {pair:?}",
+                    rows.rows()
+                ),
+            );
             let rows = rows.loss();
             trial.holds(
                 "squared_error is the sum of the squared rows, and rows carry the weight",

@@ -4,7 +4,7 @@ use hicp_core::internal::{Scratch, median};
 use hicp_core::{Correspondences, Iteration, Pair};
 
 use crate::decorator::kernel::{Kernel, RobustKernel};
-use crate::metric::error_metric::Step;
+use crate::metric::error_metric::{NO_ROWS, Step, has_rows};
 use crate::metric::minimize::Minimize;
 use crate::system::normal_equations::NormalEquations;
 
@@ -19,11 +19,11 @@ const MIN_SCALE: f64 = 1e-12;
 pub enum Scale {
     /// A known σ of the residuals, meters.
     Meters(f64),
-    /// 1.4826 × the median of |r| over the pairs with weight, computed in each step, with a floor.
+    /// 1.4826 × the median of |r| over the pairs with weight and rows, with a floor.
     ///
-    /// It is right for residuals of one dimension. Distances of points in space (`PointToPoint`)
-    /// have a median 2.3 times as large for the same σ per axis. More than half of the pairs must
-    /// be right.
+    /// It is computed in each step, and right for residuals of one dimension. Distances of points
+    /// in space (`PointToPoint`) have a median 2.3 times as large for the same σ per axis. More
+    /// than half of the pairs must be right.
     Mad {
         /// Smallest σ, meters: the resolution of the sensor.
         ///
@@ -48,7 +48,8 @@ impl Default for Scale {
 /// part of a majorizer. At a given σ, E falls with every exact step. It rises if pairs drift into
 /// the tail, although their weights vanish there, and it grows and shrinks with σ. Stop rules
 /// on the mean loss therefore keep their meaning. For [`Kernel::L2`] and for small residuals, it
-/// equals the inner loss.
+/// equals the inner loss. Pairs without rows have no part in the scale and the mean, and
+/// no weight in the copy.
 ///
 /// The kernel belongs to the set of pairs: squared errors are those of the inner metric, and
 /// [`Minimize::system`] contains the weights. Any [`RobustKernel`] can be used. Cost: one pass for
@@ -83,10 +84,11 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
     /// Computes the residuals and returns σ, or `None` if it is not finite.
     fn measure(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
         self.residuals.0.clear();
-        self.residuals.0.resize(pairs.len(), 0.0);
+        self.residuals.0.resize(pairs.len(), NO_ROWS);
         self.metric
             .add_squared_errors(iteration, pairs, 1.0, &mut self.residuals.0);
         for residual in &mut self.residuals.0 {
+            // Keeps the sign of `NO_ROWS`.
             *residual = residual.sqrt();
         }
         let pairs = pairs.as_slice();
@@ -97,7 +99,7 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
                 let counting = pairs.iter().zip(&self.residuals.0);
                 self.sorted.0.extend(
                     counting
-                        .filter(|(pair, _)| pair.weight > 0.0)
+                        .filter(|(pair, residual)| pair.weight > 0.0 && has_rows(**residual))
                         .map(|(_, residual)| *residual),
                 );
                 let sigma = SIGMA_PER_MAD * median(&mut self.sorted.0, f64::total_cmp)?;
@@ -120,8 +122,13 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
             .begin(pairs.camera_from_object(), pairs.n_candidates());
         let weighted = pairs.as_slice().iter().zip(&self.residuals.0);
         self.reweighted.0.extend(weighted.map(|(pair, residual)| {
+            let share = if has_rows(*residual) {
+                kernel.weight(residual / sigma)
+            } else {
+                0.0
+            };
             #[allow(clippy::cast_possible_truncation)] // The weight of a pair is an f32.
-            let weight = (f64::from(pair.weight) * kernel.weight(residual / sigma)) as f32;
+            let weight = (f64::from(pair.weight) * share) as f32;
             Pair { weight, ..*pair }
         }));
         self.loss(pairs, sigma)
@@ -131,9 +138,11 @@ impl<M: Minimize, K: RobustKernel> Robust<M, K> {
     fn loss(&self, pairs: &Correspondences, sigma: f64) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for (pair, residual) in pairs.as_slice().iter().zip(&self.residuals.0) {
-            let w = f64::from(pair.weight);
-            sum += w * self.kernel.loss(residual / sigma);
-            weight += w;
+            if has_rows(*residual) {
+                let w = f64::from(pair.weight);
+                sum += w * self.kernel.loss(residual / sigma);
+                weight += w;
+            }
         }
         let mean = 2.0 * sigma * sigma * sum / weight;
         (weight > 0.0 && mean.is_finite()).then_some(mean)

@@ -17,6 +17,17 @@ pub struct Step {
     pub mean_loss: f64,
 }
 
+/// The squared error of a pair without rows: the empty sum, −0.0.
+///
+/// Adding it to any number does not change that number. A sum of squares that starts with it keeps
+/// it if and only if no row is added.
+pub const NO_ROWS: f64 = -0.0;
+
+/// Returns whether a squared error, or a sum that started with [`NO_ROWS`], is that of rows.
+pub(crate) fn has_rows(squared_error: f64) -> bool {
+    squared_error.to_bits() != NO_ROWS.to_bits()
+}
+
 /// An error metric E(c, n, o, m, T) of one pair (Algorithm 1, line 3).
 ///
 /// Pairs are in the camera frame and their sources are already moved. A metric is therefore
@@ -29,9 +40,9 @@ pub struct Step {
 /// - [`ErrorMetric::linearize_all`], if there is a faster loop over many pairs.
 /// - [`ErrorMetric::step`], if the minimum has a closed form.
 ///
-/// A metric may skip pairs by adding no rows for them. The provided mean losses count such a pair
-/// with an error of zero. To leave it out, override [`ErrorMetric::step`] *and*
-/// [`ErrorMetric::mean_squared_error`], because both must have the same mean.
+/// A metric may skip pairs by adding no rows for them. Means and robust kernels leave such a pair
+/// out. A custom [`ErrorMetric::squared_error`] reports it by [`NO_ROWS`]. A custom
+/// [`ErrorMetric::step`] must report the same mean as [`ErrorMetric::mean_squared_error`].
 ///
 /// Every error metric is a [`Minimize`](crate::Minimize), which is what a stage requires. A
 /// component that acts on the whole set of pairs (a robust kernel, a prior, a frozen axis)
@@ -64,8 +75,8 @@ pub trait ErrorMetric {
 
     /// Returns E(c, n, o, m, I) of one pair at the pose of the pairs, without its weight; m².
     ///
-    /// The provided method sums the squares of the pair's rows. Robust kernels and mean losses call
-    /// it once per pair.
+    /// Returns [`NO_ROWS`] for a pair without rows. The provided method sums the squares of the
+    /// pair's rows. Robust kernels and mean losses call it once per pair.
     fn squared_error(&self, pair: &Pair) -> f64 {
         let mut system = NormalEquations::of_loss(pair.source.point.cast());
         let unweighted = Pair {
@@ -73,7 +84,11 @@ pub trait ErrorMetric {
             ..*pair
         };
         self.linearize(&unweighted, &mut system);
-        system.loss()
+        if system.rows > 0 {
+            system.loss()
+        } else {
+            NO_ROWS
+        }
     }
 
     /// Returns the weighted mean of the errors at the pose of the pairs, as [`ErrorMetric::step`]
@@ -83,9 +98,12 @@ pub trait ErrorMetric {
     fn mean_squared_error(&self, pairs: &Correspondences) -> Option<f64> {
         let (mut sum, mut weight) = (0.0, 0.0);
         for pair in pairs.as_slice() {
-            let w = f64::from(pair.weight);
-            sum += w * self.squared_error(pair);
-            weight += w;
+            let error = self.squared_error(pair);
+            if has_rows(error) {
+                let w = f64::from(pair.weight);
+                sum += w * error;
+                weight += w;
+            }
         }
         let mean = sum / weight;
         (weight > 0.0 && mean.is_finite()).then_some(mean)
@@ -108,9 +126,10 @@ pub trait ErrorMetric {
     /// than unknowns, or numbers that are not finite. The provided method is one Gauss–Newton step.
     fn step(&self, pairs: &Correspondences) -> Option<Step> {
         let system = self.linearize_all(pairs)?;
-        let sum = || pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
-        let weight: f64 = system.weight.unwrap_or_else(sum);
-        let mean_loss = system.loss() / weight;
+        let mean_loss = match system.weight {
+            Some(weight) => system.loss() / weight,
+            None => self.mean_squared_error(pairs)?,
+        };
         let increment = system.solve()?;
         mean_loss.is_finite().then_some(Step {
             increment,
@@ -139,11 +158,18 @@ impl<M: ErrorMetric + ?Sized> VectorLoop for Linearize<'_, M> {
         // and scaled by the radius.
         let mut moments = Moments::about_first(self.pairs)?;
         let mut system = NormalEquations::new(moments.origin, 1.0);
+        let mut skipped = 0.0;
         for pair in self.pairs {
             moments.add(pair);
+            let before = system.rows;
             self.metric.linearize(pair, &mut system);
+            if system.rows == before {
+                skipped += f64::from(pair.weight);
+            }
         }
-        system.centered(&moments)
+        let mut system = system.centered(&moments)?;
+        system.weight = Some(moments.weight() - skipped);
+        Some(system)
     }
 }
 

@@ -115,6 +115,9 @@ pub trait Minimize {
     }
 
     /// Adds `factor` times the squared error of each pair, without its weight, to `errors`; m².
+    ///
+    /// The factor is above zero. Pairs without rows keep their entry, also the initial value
+    /// [`NO_ROWS`](crate::NO_ROWS).
     fn add_squared_errors(
         &mut self,
         iteration: &Iteration<'_>,

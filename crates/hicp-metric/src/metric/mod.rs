@@ -9,7 +9,7 @@ pub(crate) mod point_to_point;
 pub(crate) mod symmetric;
 pub(crate) mod weighted_sum;
 
-pub use error_metric::{ErrorMetric, Step};
+pub use error_metric::{ErrorMetric, NO_ROWS, Step};
 pub use generalized::Generalized;
 pub use minimize::Minimize;
 pub use plane_to_point::PlaneToPoint;

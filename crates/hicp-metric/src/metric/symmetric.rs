@@ -2,7 +2,7 @@
 
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Translation3, Vector3, so3};
 
-use crate::metric::error_metric::{ErrorMetric, Step};
+use crate::metric::error_metric::{ErrorMetric, NO_ROWS, Step};
 use crate::system::moments::length_of;
 use crate::system::normal_equations::NormalEquations;
 
@@ -25,8 +25,9 @@ use crate::system::normal_equations::NormalEquations;
 /// [`Degeneracy::Damp`](crate::Degeneracy::Damp).
 ///
 /// Both normals must have the same orientation. Pairs with n_o · n_c ≤ 0 are on different sides and
-/// are skipped: they have no row, no part in the mean loss, and a squared error of zero. There is
-/// no step from fewer than six other pairs. Cost: two passes and a 6×6 Cholesky decomposition.
+/// are skipped: they have no row, no part in the mean loss, and the squared error [`NO_ROWS`].
+/// There is no step from fewer than six other pairs. Cost: two passes and a 6×6 Cholesky
+/// decomposition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Symmetric;
 
@@ -60,19 +61,7 @@ impl ErrorMetric for Symmetric {
 
     #[inline]
     fn squared_error(&self, pair: &Pair) -> f64 {
-        Self::residual(pair).map_or(0.0, |(_, residual)| residual * residual)
-    }
-
-    fn mean_squared_error(&self, pairs: &Correspondences) -> Option<f64> {
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for pair in pairs.as_slice() {
-            if let Some((_, residual)) = Self::residual(pair) {
-                sum += f64::from(pair.weight) * residual * residual;
-                weight += f64::from(pair.weight);
-            }
-        }
-        let mean = sum / weight;
-        (weight > 0.0 && mean.is_finite()).then_some(mean)
+        Self::residual(pair).map_or(NO_ROWS, |(_, residual)| residual * residual)
     }
 
     fn step(&self, pairs: &Correspondences) -> Option<Step> {

@@ -23,7 +23,7 @@ pub struct NormalEquations {
     pub(crate) pivot: Point3<f64>,
     pub(crate) length: f64,
     inverse_length: f64,
-    /// Σ w over the pairs, if [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all)
+    /// Σ w over the pairs with rows, if [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all)
     /// summed the system.
     pub(crate) weight: Option<f64>,
     /// Variance of a residual of weight 1, if it is known instead of estimated.
@@ -103,6 +103,7 @@ impl NormalEquations {
         weight: f64,
     ) {
         if self.loss_only {
+            self.rows += usize::from(weight > 0.0);
             return self.sums.add_loss(residual, weight);
         }
         let lever = (point - self.pivot).cross(direction) * self.inverse_length;

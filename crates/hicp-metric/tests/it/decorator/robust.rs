@@ -277,6 +277,45 @@ fn the_scale_is_the_median_of_pairs_with_weight() {
     assert_eq!(a, b);
 }
 
+/// Skipped pairs have neither a residual of zero nor a weight.
+#[test]
+fn pairs_without_rows_change_nothing() {
+    let mut numbers = Numbers(49);
+    let pairs = messy(&mut numbers, 100);
+    let mut more = pairs.clone();
+    for count in [0, 60, 100, 150] {
+        for pair in messy(&mut numbers, count).as_slice() {
+            let mut opposite = *pair;
+            opposite.target.normal = -opposite.source.normal;
+            more.push(opposite);
+        }
+        for kernel in KERNELS {
+            for scale in [Scale::Mad { floor_meters: 1e-4 }, Scale::Meters(1e-3)] {
+                let mut metric = Robust::new(Symmetric, kernel, scale);
+                let mut answers = |pairs| {
+                    let iteration = Iteration::default();
+                    let mean_loss = metric.mean_loss(&iteration, pairs);
+                    let step = metric.minimize(&iteration, pairs);
+                    (
+                        mean_loss.unwrap(),
+                        step.unwrap(),
+                        metric.system(&iteration, pairs),
+                    )
+                };
+                assert_eq!(
+                    answers(&more),
+                    answers(&pairs),
+                    "{kernel:?} {scale:?} {count}"
+                );
+                if kernel == Kernel::L2 {
+                    let inner = Symmetric.mean_squared_error(&more).unwrap();
+                    assert!((answers(&more).0 - inner).abs() < 1e-14 * inner);
+                }
+            }
+        }
+    }
+}
+
 /// At a fixed scale, the loss that the divergence rules judge does not rise.
 ///
 /// It shows a drift into the tail.

@@ -5,7 +5,8 @@ use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair, Vector3};
 use hicp_metric::Minimize;
 use hicp_metric::{
-    ErrorMetric, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint, Symmetric, WeightedSum,
+    ErrorMetric, NO_ROWS, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint, Symmetric,
+    WeightedSum,
 };
 
 /// The point at which a pair's rows act.
@@ -227,4 +228,58 @@ fn a_term_of_factor_zero_is_skipped() {
         system.map(|system| system.information())
     };
     assert_eq!(information(&mut sum), information(&mut PointToPlane));
+}
+
+/// Returns pairs, and the same ones followed by pairs with opposite normals.
+fn with_opposite_normals(numbers: &mut Numbers, count: usize) -> [Correspondences; 2] {
+    let pairs = messy(numbers, 60);
+    let mut more = pairs.clone();
+    for pair in messy(numbers, count).as_slice() {
+        let mut opposite = *pair;
+        opposite.target.normal = -opposite.source.normal;
+        more.push(opposite);
+    }
+    [pairs, more]
+}
+
+#[test]
+fn the_provided_means_leave_out_pairs_without_rows() {
+    let [few, more] = with_opposite_normals(&mut Numbers(406), 90);
+    let skipped = &more.as_slice()[few.len()];
+    let found = Rows(Symmetric).squared_error(skipped);
+    assert_eq!(found.to_bits(), NO_ROWS.to_bits());
+    // An exact fit has rows.
+    let exact = Pair {
+        target: skipped.source,
+        ..*skipped
+    };
+    assert_eq!(Rows(Symmetric).squared_error(&exact).to_bits(), 0);
+    let [expected, found] = [&few, &more].map(|pairs| Rows(Symmetric).mean_squared_error(pairs));
+    assert_eq!(expected, found);
+    assert_eq!(found, Symmetric.mean_squared_error(&more));
+    let [expected, found] =
+        [&few, &more].map(|pairs| Rows(Symmetric).step(pairs).unwrap().mean_loss);
+    assert!((found - expected).abs() < 1e-12 * expected);
+}
+
+/// A sum has no rows for a pair only if no term has one.
+#[test]
+fn a_pair_that_one_term_skips_has_the_error_of_the_others() {
+    let [few, more] = with_opposite_normals(&mut Numbers(407), 3);
+    let errors = |terms: Vec<(f64, Box<dyn Minimize>)>| {
+        let mut errors = vec![NO_ROWS; more.len()];
+        let mut sum = WeightedSum { terms };
+        sum.add_squared_errors(&Iteration::default(), &more, 1.0, &mut errors);
+        errors.split_off(few.len())
+    };
+    let both = errors(vec![
+        (2.0, Box::new(Symmetric)),
+        (0.5, Box::new(PointToPoint)),
+    ]);
+    for (found, pair) in both.iter().zip(&more.as_slice()[few.len()..]) {
+        assert_eq!(*found, 0.5 * PointToPoint.squared_error(pair));
+    }
+    for found in errors(vec![(2.0, Box::new(Symmetric)), (0.5, Box::new(Symmetric))]) {
+        assert_eq!(found.to_bits(), NO_ROWS.to_bits());
+    }
 }
