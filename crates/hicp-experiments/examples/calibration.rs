@@ -103,7 +103,7 @@ fn sample(seen: &TrajectoryStep<'_>) -> Result<Option<Sample>, Failed> {
         return Ok(None);
     };
     let pose = step.outcome.camera_from_object;
-    let truth = seen.nearest_truth(&pose)?;
+    let truth = seen.nearest_truth(&pose);
     let quality = step.outcome.quality.as_ref();
     Ok(Some(Sample {
         trajectory: (seen.object.name.clone(), seen.trajectory),

@@ -4,6 +4,8 @@ use thiserror::Error;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
+use crate::pose::{se3, so3};
+
 /// Number of rotations into which BOP divides a continuous symmetry: ⌈π/0.01⌉.
 const CONTINUOUS_STEPS: usize = 315;
 
@@ -11,6 +13,14 @@ const CONTINUOUS_STEPS: usize = 315;
 ///
 /// A thousand times the number for any object.
 pub const MAX_SYMMETRY_MOTIONS: usize = 1_000_000;
+
+/// Relative rounding of a length.
+const ROUNDING: f64 = 1e-13;
+
+/// Squared sine of an angle below which two axes count as one that is declared twice.
+///
+/// It is about ten degrees, since the axes of a sphere are far apart.
+const PARALLEL: f64 = 0.03;
 
 /// A continuous rotational symmetry: all rotations around an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,48 +124,60 @@ impl Symmetries {
 
     /// Returns the pose that is equivalent to `pose` and nearest to `reference`.
     ///
-    /// It has the smallest angle to `reference`, and of several the smallest distance. Rotations
-    /// around an axis are not limited to the steps of [`Symmetries::motions`]. Cost:
-    /// O([`Symmetries::n_motions`]).
+    /// The distance is √(|φ|²r² + |Δc|²), where φ is the rotation between the poses, c the object's
+    /// `center` (object frame) and r its `radius` (meters). Continuous symmetries are solved in
+    /// closed form for φ, together with every discrete one, since the center of such an object lies
+    /// on the axis. Two axes make a sphere, for which every rotation around their intersection is a
+    /// symmetry. If `pose` itself is the nearest, it is returned bit for bit.
+    ///
+    /// Cost: well below a microsecond per discrete symmetry and axis.
     ///
     /// ```
     /// use hicp_core::{Isometry3, Point3, Symmetries, SymmetryAxis, Vector3};
     /// let mut symmetries = Symmetries::default();
     /// symmetries.continuous.push(SymmetryAxis::new(Vector3::z(), Point3::origin()).unwrap());
-    /// let turned = Isometry3::rotation(Vector3::z() * 1.234);
-    /// let nearest = symmetries.nearest_equivalent(&turned, &Isometry3::identity());
-    /// assert!(nearest.rotation.angle() < 1e-6);
+    /// let (turned, reference) = (Isometry3::rotation(Vector3::z() * 1.234), Isometry3::identity());
+    /// let nearest = symmetries.nearest_equivalent(&turned, &reference, &Point3::origin(), 0.1);
+    /// assert!(nearest.rotation.angle() < 1e-9);
     /// ```
-    ///
-    /// # Panics
-    ///
-    /// As [`Symmetries::motions`].
     #[must_use]
     pub fn nearest_equivalent(
         &self,
         pose: &Isometry3<f64>,
         reference: &Isometry3<f64>,
+        center: &Point3<f64>,
+        radius: f64,
     ) -> Isometry3<f64> {
-        let between = |pose: &Isometry3<f64>| {
-            let angle = pose.rotation.angle_to(&reference.rotation);
-            let distance = (pose.translation.vector - reference.translation.vector).norm();
-            (angle, distance)
+        let distance = |pose: &Isometry3<f64>| {
+            let (angle, _) = se3::pose_distance(pose, reference);
+            let apart = pose * center - reference * center;
+            (angle * radius).hypot(apart.norm())
         };
-        let mut best = *pose;
-        for motion in self.motions() {
-            let mut other = pose * motion;
-            for axis in &self.continuous {
-                let turn = reference.rotation.inverse() * other.rotation;
-                let twist = turn.imag().dot(&axis.direction());
-                other *= axis.rotation(-2.0 * twist.atan2(turn.w));
+        let mut best = (*pose, distance(pose));
+        let places = pose.translation.vector.norm() + reference.translation.vector.norm();
+        let rounding = ROUNDING * (radius + places);
+        let mut consider = |candidate: Isometry3<f64>| {
+            let distance = distance(&candidate);
+            // The gain must exceed the rounding of the lengths, so that a pose that is already
+            // nearest does not change.
+            if distance < best.1 - rounding {
+                best = (candidate, distance);
             }
-            let ((angle, distance), (least, nearest)) = (between(&other), between(&best));
-            // Angles of equal rotations differ by rounding.
-            if angle < least - 1e-6 || (angle < least + 1e-6 && distance < nearest) {
-                best = other;
+        };
+        let identity = Isometry3::identity();
+        for discrete in std::iter::once(&identity).chain(&self.discrete) {
+            let candidate = se3::compose(pose, discrete);
+            consider(candidate);
+            for axis in &self.continuous {
+                consider(turned(&candidate, reference, axis));
             }
         }
-        best
+        if let Some(point) = center_of_all_turns(&self.continuous) {
+            let rotation = reference.rotation;
+            let place = pose * point - rotation * point;
+            consider(Isometry3::from_parts(place.into(), rotation));
+        }
+        best.0
     }
 
     /// Returns the symmetry motions as BOP expands them, the identity first.
@@ -183,6 +205,48 @@ impl Symmetries {
         }
         motions
     }
+}
+
+/// Returns the intersection of two axes of a sphere, or `None` if all axes are one.
+///
+/// Declared axes are rounded, so it is the point nearest to both.
+fn center_of_all_turns(axes: &[SymmetryAxis]) -> Option<Point3<f64>> {
+    let (first, others) = axes.split_first()?;
+    others.iter().find_map(|second| {
+        let [a, b] = [first, second].map(|axis| axis.direction().into_inner());
+        let (normal, between) = (a.cross(&b), second.offset() - first.offset());
+        let square = normal.norm_squared();
+        (square > PARALLEL).then(|| {
+            let along_first = between.cross(&b).dot(&normal) / square;
+            let along_second = between.cross(&a).dot(&normal) / square;
+            nalgebra::center(
+                &(first.offset() + a * along_first),
+                &(second.offset() + b * along_second),
+            )
+        })
+    })
+}
+
+/// Rotates the object around an axis such that its rotation is nearest to the reference's.
+///
+/// tr(C_refᵀ C R(θ)) = const + p cos θ + q sin θ, with p = tr M − aᵀMa and q = tr(M a^) for M =
+/// C_refᵀ C. It is largest at θ = atan2(q, p).
+fn turned(
+    pose: &Isometry3<f64>,
+    reference: &Isometry3<f64>,
+    axis: &SymmetryAxis,
+) -> Isometry3<f64> {
+    let m = (reference.rotation.inverse() * pose.rotation)
+        .to_rotation_matrix()
+        .into_inner();
+    let direction = axis.direction().into_inner();
+    let cosine = m.trace() - direction.dot(&(m * direction));
+    let sine = (m * so3::hat(&direction)).trace();
+    if cosine.hypot(sine) < 1e-12 {
+        // The axes are opposite: all angles have the same distance.
+        return *pose;
+    }
+    se3::compose(pose, &axis.rotation(sine.atan2(cosine)))
 }
 
 /// The reason why values do not describe a symmetry.

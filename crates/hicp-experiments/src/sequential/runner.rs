@@ -263,7 +263,7 @@ impl<'a> TrajectoryRunner<'a> {
         if let Some(fused) = one.estimator.estimate()
             && model.symmetries().continuous.is_empty()
         {
-            let nearest = nearest_truth(model, truth, &pose)?;
+            let nearest = nearest_truth(model, truth, &pose);
             let exact = PoseEstimate::new(nearest, Matrix6::zeros())?;
             measured.mahalanobis_squared = Some(exact.mahalanobis_squared(&fused));
         }

@@ -2,7 +2,6 @@
 
 use hicp_core::{Isometry3, Model};
 use hybrid_icp::SequentialStep;
-use hybrid_icp::fusion::{FusionError, LastEstimate, SymmetryAware};
 
 use crate::subject::Subject;
 
@@ -25,11 +24,8 @@ pub struct TrajectoryStep<'a> {
 
 impl TrajectoryStep<'_> {
     /// Returns the true pose that is nearest to a pose, among all that the symmetries allow.
-    ///
-    /// # Errors
-    ///
-    /// [`FusionError`] when the object's size is out of range.
-    pub fn nearest_truth(&self, pose: &Isometry3<f64>) -> Result<Isometry3<f64>, FusionError> {
+    #[must_use]
+    pub fn nearest_truth(&self, pose: &Isometry3<f64>) -> Isometry3<f64> {
         nearest_truth(&self.object.model, &self.camera_from_object, pose)
     }
 }
@@ -39,9 +35,8 @@ pub(super) fn nearest_truth(
     model: &Model,
     truth: &Isometry3<f64>,
     pose: &Isometry3<f64>,
-) -> Result<Isometry3<f64>, FusionError> {
+) -> Isometry3<f64> {
     let (center, radius) = (model.center(), model.radius());
-    let inner = LastEstimate::default();
-    let symmetric = SymmetryAware::new(inner, model.symmetries().clone(), center, radius)?;
-    Ok(symmetric.representative(truth, pose))
+    let symmetries = model.symmetries();
+    symmetries.nearest_equivalent(truth, pose, &center, radius)
 }

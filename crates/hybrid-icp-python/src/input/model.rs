@@ -282,8 +282,9 @@ impl PyModel {
     ) -> PyResult<Matrix> {
         let pose = array::motion(T_co, "T_co")?.isometry;
         let reference = array::motion(reference, "reference")?.isometry;
+        let (center, radius) = (self.model.center(), self.model.radius());
         let symmetries = self.model.symmetries();
-        let nearest = symmetries.nearest_equivalent(&pose, &reference);
+        let nearest = symmetries.nearest_equivalent(&pose, &reference, &center, radius);
         Ok(Matrix::from(&nearest))
     }
 

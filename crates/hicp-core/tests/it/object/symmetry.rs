@@ -71,6 +71,58 @@ fn the_symmetry_motions_of_a_cylinder_leave_it_unchanged() {
     }
 }
 
+/// Returns the distance that the nearest pose minimizes.
+fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>, center: &Point3<f64>, radius: f64) -> f64 {
+    let angle = (a.rotation * b.rotation.inverse()).angle();
+    (angle * radius).hypot((a * center - b * center).norm())
+}
+
+/// The definition: no other motion leads to a nearer pose.
+#[test]
+fn the_nearest_equivalent_pose_is_not_farther_than_any_motion() {
+    let mut numbers = Numbers(62);
+    let center = Point3::new(0.03, -0.02, 0.05);
+    for _ in 0..10 {
+        // A body of revolution whose ends are alike.
+        let direction = numbers.direction();
+        let across = UnitVector3::new_normalize(direction.cross(&numbers.direction()));
+        let half_turn = UnitQuaternion::from_axis_angle(&across, std::f64::consts::PI);
+        let symmetries = Symmetries {
+            discrete: vec![Isometry3::rotation_wrt_point(half_turn, center)],
+            continuous: vec![SymmetryAxis::new(direction, center).unwrap()],
+        };
+        let pose = |numbers: &mut Numbers| Isometry3::new(numbers.vector(), numbers.vector() * 3.0);
+        let (reference, pose) = (pose(&mut numbers), pose(&mut numbers));
+        let found = symmetries.nearest_equivalent(&pose, &reference, &center, 0.1);
+        let distance = apart(&found, &reference, &center, 0.1);
+        let least = (symmetries.motions().iter())
+            .map(|motion| apart(&(pose * motion), &reference, &center, 0.1))
+            .fold(f64::INFINITY, f64::min);
+        assert!(distance <= least + 1e-12, "{distance} {least}");
+        // Half a step of 2π/315 is the most that an exact solution gains.
+        assert!(least < distance + 0.1 * 0.01, "{distance} {least}");
+    }
+}
+
+/// Two axes make a sphere, whose rotation never differs.
+#[test]
+fn the_nearest_equivalent_pose_of_a_sphere_has_the_rotation_of_the_reference() {
+    let mut numbers = Numbers(63);
+    let center = Point3::new(0.03, -0.02, 0.05);
+    let axes = [Vector3::z(), Vector3::x()].map(|axis| SymmetryAxis::new(axis, center).unwrap());
+    let symmetries = Symmetries {
+        discrete: vec![],
+        continuous: axes.to_vec(),
+    };
+    for _ in 0..20 {
+        let pose = Isometry3::new(numbers.vector(), numbers.vector() * 3.0);
+        let reference = Isometry3::new(numbers.vector(), numbers.vector() * 3.0);
+        let found = symmetries.nearest_equivalent(&pose, &reference, &center, 0.1);
+        assert!(found.rotation.angle_to(&reference.rotation) < 1e-7);
+        assert!((found * center - pose * center).norm() < 1e-14);
+    }
+}
+
 #[test]
 fn an_axis_needs_a_direction() {
     let (x, origin) = (Vector3::x(), Point3::origin());
