@@ -72,6 +72,7 @@ pub fn check_metric<T: ErrorMetric + 'static>(make: impl Fn() -> T, laws: Metric
 ///   with degenerate pairs or pairs that are not finite, `minimize`, `system` and `mean_loss`
 ///   return `None` or finite numbers.
 /// - Losses are not negative. `minimize` reports the `mean_loss`.
+/// - `system_and_loss` returns the bits of `system`, and `mean_loss` up to rounding.
 /// - Keeps the laws of [`MetricLaws`] except `rows`.
 ///
 /// # Panics
@@ -94,6 +95,22 @@ pub fn check_minimize<T: Minimize + 'static>(make: impl Fn() -> T, laws: MetricL
                 "minimize reports the mean loss",
                 close(step.mean_loss, loss, 1e-6),
                 format_args!("{} from minimize, {loss} from mean_loss", step.mean_loss),
+            );
+        }
+        if let Some((system, loss)) = trial.calm(|| {
+            let pairs = &set.pairs;
+            make().system_and_loss(&Iteration::default(), pairs)
+        }) {
+            trial.same(
+                "system_and_loss returns the system",
+                &answers.system,
+                &Some(system),
+            );
+            let expected = answers.mean_loss;
+            trial.holds(
+                "system_and_loss returns the mean loss",
+                expected.is_some_and(|expected| close(loss, expected, 1e-6)),
+                format_args!("{loss} from system_and_loss, {expected:?} from mean_loss"),
             );
         }
         if good {

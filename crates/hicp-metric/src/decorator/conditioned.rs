@@ -48,6 +48,15 @@ impl<M: Minimize> Minimize for Conditioned<M> {
         Some(system.with_policy(self.policy, self.threshold))
     }
 
+    fn system_and_loss(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<(NormalEquations, f64)> {
+        let (system, mean_loss) = self.metric.system_and_loss(iteration, pairs)?;
+        Some((system.with_policy(self.policy, self.threshold), mean_loss))
+    }
+
     fn label(&self) -> &'static str {
         "conditioned"
     }

@@ -168,6 +168,16 @@ impl<M: Minimize, K: RobustKernel> Minimize for Robust<M, K> {
         self.metric.system(iteration, &self.reweighted.0)
     }
 
+    fn system_and_loss(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<(NormalEquations, f64)> {
+        let mean_loss = self.reweigh(iteration, pairs)?;
+        let system = self.metric.system(iteration, &self.reweighted.0)?;
+        Some((system, mean_loss))
+    }
+
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
         let mean_loss = self.reweigh(iteration, pairs)?;
         let step = self.metric.minimize(iteration, &self.reweighted.0)?;

@@ -126,13 +126,9 @@ pub trait ErrorMetric {
     /// than unknowns, or numbers that are not finite. The provided method is one Gauss–Newton step.
     fn step(&self, pairs: &Correspondences) -> Option<Step> {
         let system = self.linearize_all(pairs)?;
-        let mean_loss = match system.weight {
-            Some(weight) => system.loss() / weight,
-            None => self.mean_squared_error(pairs)?,
-        };
-        let increment = system.solve()?;
-        mean_loss.is_finite().then_some(Step {
-            increment,
+        let mean_loss = system.mean_loss_or(|| self.mean_squared_error(pairs))?;
+        Some(Step {
+            increment: system.solve()?,
             mean_loss,
         })
     }

@@ -10,8 +10,8 @@ use crate::system::normal_equations::NormalEquations;
 ///
 /// A decorator (a kernel with a scale, a prior, a frozen direction) acts on the set of pairs and
 /// not on one of them. It returns the wrapped metric in [`Minimize::inner`] and overrides the
-/// methods that it changes. The others forward, except for [`Minimize::minimize`]: it solves the
-/// decorator's own [`Minimize::system`].
+/// methods that it changes. The others forward, except for [`Minimize::system_and_loss`] and
+/// [`Minimize::minimize`], which use the decorator's own system and mean loss.
 ///
 /// A decorator that does not change the system, for example because it counts or logs, must
 /// override `minimize`, too, and call that of the wrapped metric. Otherwise one Gauss–Newton step
@@ -130,15 +130,28 @@ pub trait Minimize {
         }
     }
 
+    /// Returns [`Minimize::system`] and [`Minimize::mean_loss`].
+    ///
+    /// The provided method calls both. Override it if one pass over the pairs yields both.
+    fn system_and_loss(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<(NormalEquations, f64)> {
+        let system = self.system(iteration, pairs)?;
+        Some((system, self.mean_loss(iteration, pairs)?))
+    }
+
     /// Computes one step of minimization over all pairs.
     ///
     /// Returns `None` if the pairs do not determine a step: no pairs, only zero weights, fewer rows
     /// than unknowns, or numbers that are not finite. The provided method is one Gauss–Newton step:
-    /// it solves [`Minimize::system`]. It does not call [`Minimize::inner`].
+    /// it solves the system of [`Minimize::system_and_loss`]. It does not call [`Minimize::inner`].
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        let (system, mean_loss) = self.system_and_loss(iteration, pairs)?;
         Some(Step {
-            increment: self.system(iteration, pairs)?.solve()?,
-            mean_loss: self.mean_loss(iteration, pairs)?,
+            increment: system.solve()?,
+            mean_loss,
         })
     }
 
@@ -172,6 +185,16 @@ impl<M: ErrorMetric + ?Sized> Minimize for M {
         for (error, pair) in errors.iter_mut().zip(pairs.as_slice()) {
             *error += factor * self.squared_error(pair);
         }
+    }
+
+    fn system_and_loss(
+        &mut self,
+        _: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<(NormalEquations, f64)> {
+        let system = self.linearize_all(pairs)?;
+        let mean_loss = system.mean_loss_or(|| self.mean_squared_error(pairs))?;
+        Some((system, mean_loss))
     }
 
     fn minimize(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
@@ -215,6 +238,14 @@ macro_rules! forward {
                 errors: &mut [f64],
             ) {
                 (**self).add_squared_errors(iteration, pairs, factor, errors);
+            }
+
+            fn system_and_loss(
+                &mut self,
+                iteration: &Iteration<'_>,
+                pairs: &Correspondences,
+            ) -> Option<(NormalEquations, f64)> {
+                (**self).system_and_loss(iteration, pairs)
             }
 
             fn minimize(

@@ -141,6 +141,17 @@ impl NormalEquations {
         self.sums.loss()
     }
 
+    /// Returns the loss divided by the weight of the pairs, or another mean if that is not known.
+    ///
+    /// If it is not finite, returns `None`.
+    pub(crate) fn mean_loss_or(&self, other: impl FnOnce() -> Option<f64>) -> Option<f64> {
+        let mean = match self.weight {
+            Some(weight) => self.loss() / weight,
+            None => other()?,
+        };
+        mean.is_finite().then_some(mean)
+    }
+
     /// Center of rotations, camera frame, meters.
     #[must_use]
     pub fn pivot(&self) -> Point3<f64> {

@@ -1,16 +1,16 @@
 //! Tests that decorators forward what they do not change.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use crate::scenes::{Numbers, center, messy};
 use hicp_core::Iteration;
-use hicp_core::{Correspondences, Isometry3, Problem};
+use hicp_core::{Correspondences, Isometry3, Pair, Problem};
 use hicp_metric::Minimize;
 use hicp_metric::{
-    Conditioned, Degeneracy, Frame, Frozen, GaussNewton, Generalized, Kernel, LevenbergMarquardt,
-    MetricSchedule, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint, PosePrior, Prior,
-    Robust, Scale, Symmetric, WeightedSum,
+    Conditioned, Degeneracy, ErrorMetric, Frame, Frozen, GaussNewton, Generalized, Kernel,
+    LevenbergMarquardt, MetricSchedule, NormalEquations, PlaneToPoint, PointToPlane, PointToPoint,
+    PosePrior, Prior, Robust, Scale, Symmetric, WeightedSum,
 };
 
 type Seen = Rc<RefCell<Vec<(usize, Isometry3<f64>)>>>;
@@ -318,4 +318,69 @@ fn decorators_compare_by_their_options() {
     assert!(unchanged(GaussNewton::new(PointToPlane), &pairs));
     assert!(unchanged(LevenbergMarquardt::new(PointToPlane), &pairs));
     assert_ne!(robust, Robust::default());
+}
+
+/// Point-to-plane that counts the pairs whose squared errors are computed.
+struct Counted(Cell<usize>);
+
+impl ErrorMetric for Counted {
+    fn linearize(&self, pair: &Pair, system: &mut NormalEquations) {
+        PointToPlane.linearize(pair, system);
+    }
+
+    fn squared_error(&self, pair: &Pair) -> f64 {
+        self.0.set(self.0.get() + 1);
+        PointToPlane.squared_error(pair)
+    }
+}
+
+/// A policy measures nothing that the metric has already measured.
+#[test]
+fn a_policy_adds_no_pass_over_the_pairs() {
+    fn check<M: Minimize>(metric: M, passes: usize, count: impl Fn(&M) -> usize) {
+        let mut numbers = Numbers(110);
+        let (iteration, pairs) = (Iteration::default(), messy(&mut numbers, 80));
+        let mut metric = Conditioned {
+            metric,
+            policy: Degeneracy::Freeze,
+            threshold: Degeneracy::THRESHOLD,
+        };
+        let step = metric.minimize(&iteration, &pairs).unwrap();
+        assert_eq!(count(&metric.metric), passes * pairs.len());
+        // With the same results as from one method after the other.
+        let system = metric.system(&iteration, &pairs).unwrap();
+        assert_eq!(Some(step.increment), system.solve());
+        let mean_loss = metric.mean_loss(&iteration, &pairs).unwrap();
+        assert!((step.mean_loss - mean_loss).abs() < 1e-13 * mean_loss);
+    }
+    check(Counted(Cell::new(0)), 0, |metric| metric.0.get());
+    let robust = Robust::new(Counted(Cell::new(0)), Kernel::TUKEY, Scale::default());
+    check(robust, 1, |metric| metric.metric.0.get());
+}
+
+/// A decorator that reports twice the mean loss.
+struct Doubled(PointToPlane);
+
+impl Minimize for Doubled {
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        Some(&mut self.0)
+    }
+
+    fn mean_loss(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        Some(2.0 * self.0.mean_loss(iteration, pairs)?)
+    }
+}
+
+/// The mean loss of a policy is that of its metric, also if it is not that of the system.
+#[test]
+fn a_policy_reports_the_mean_loss_of_a_custom_decorator() {
+    let mut numbers = Numbers(111);
+    let (iteration, pairs) = (Iteration::default(), messy(&mut numbers, 80));
+    let mut metric = Conditioned {
+        metric: Doubled(PointToPlane),
+        policy: Degeneracy::Freeze,
+        threshold: Degeneracy::THRESHOLD,
+    };
+    let step = metric.minimize(&iteration, &pairs).unwrap();
+    assert_eq!(Some(step.mean_loss), metric.mean_loss(&iteration, &pairs));
 }

@@ -136,6 +136,43 @@ fn a_decorator_that_counts_its_calls_is_detected() {
     });
 }
 
+/// A decorator that states another loss next to the system.
+struct OtherLoss;
+
+impl Minimize for OtherLoss {
+    fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
+        None
+    }
+
+    fn system(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<NormalEquations> {
+        PointToPlane.linearize_all(pairs)
+    }
+
+    fn mean_loss(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<f64> {
+        PointToPlane.mean_squared_error(pairs)
+    }
+
+    fn system_and_loss(
+        &mut self,
+        _: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<(NormalEquations, f64)> {
+        let system = PointToPlane.linearize_all(pairs)?;
+        Some((system, system.loss()))
+    }
+
+    fn minimize(&mut self, _: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
+        PointToPlane.step(pairs)
+    }
+}
+
+#[test]
+fn a_loss_that_is_not_that_of_the_system_is_detected() {
+    caught("system_and_loss returns the mean loss", || {
+        check_minimize(|| OtherLoss, MetricLaws::default());
+    });
+}
+
 /// A wrapper that forwards the required methods but not the provided ones.
 struct Unforwarded<M>(M);
 
