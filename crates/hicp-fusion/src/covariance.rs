@@ -62,7 +62,8 @@ impl MveCovariance {
 /// outcome) reflects which directions the geometry constrains, but assumes right pairs with
 /// independent errors. The second term adds the rest: a floor of f units for systematic errors of
 /// camera and model, and a share that grows with the MVE e. If the pairs leave a direction
-/// undetermined, there is no Σ_reg, and `undetermined` units replace f.
+/// undetermined, or the metric's policy freezes it, there is no Σ_reg, and `undetermined` units
+/// replace f.
 ///
 /// With `UnitCovariance::AboutObject`, a standard deviation of one unit is a radius and 1 rad.
 /// **The defaults are not calibrated**: fit the factors to data with ground truth, until ξᵀΣ⁻¹ξ of

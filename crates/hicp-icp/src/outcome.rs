@@ -215,7 +215,8 @@ impl Quality {
     /// Returns the 6×6 covariance of the pose, in the same convention.
     ///
     /// It is valid if the pairs are right and their residuals independent; see
-    /// [`NormalEquations::covariance`]. If a direction is not determined, returns `None`.
+    /// [`NormalEquations::covariance`]. If a direction is not determined, or the metric's policy
+    /// freezes it, returns `None`.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
         self.system.as_ref().and_then(NormalEquations::covariance)

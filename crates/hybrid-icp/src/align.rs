@@ -287,8 +287,9 @@ impl Alignment {
     /// Returns the 6×6 covariance of the pose for ξ = [ρ; φ] (translation first, meters and
     /// radians), a left perturbation in the frame of the target.
     ///
-    /// `None` if a direction is not determined ([`CloudWarning::Undetermined`]). It does not
-    /// contain wrong pairs, so it is optimistic where the clouds overlap in part.
+    /// `None` if a direction is not determined ([`CloudWarning::Undetermined`]), or if the last
+    /// iteration froze a rotation. It does not contain wrong pairs, so it is optimistic where the
+    /// clouds overlap in part.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
         let is_open = |w: &CloudWarning| matches!(w, CloudWarning::Undetermined { .. });

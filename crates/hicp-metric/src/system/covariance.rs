@@ -39,8 +39,8 @@ impl NormalEquations {
     /// [`NormalEquations::information`]. A known variance ([`NormalEquations::with_variance`])
     /// replaces s². If components are frozen ([`NormalEquations::freeze`]), they have no variance,
     /// and N minus the number of free components replaces N − 6. Returns `None` if the rows do not
-    /// determine all free components, if a number is not finite, or if no row is left over to
-    /// estimate an unknown variance.
+    /// determine all free components, if the policy freezes or refuses one of them, if a number is
+    /// not finite, or if no row is left over to estimate an unknown variance.
     ///
     /// It is valid at the pose that minimizes the loss, for right pairs and independent residuals
     /// whose variances are inversely proportional to their weights. It does not contain wrong pairs
@@ -71,7 +71,7 @@ impl NormalEquations {
         let (mut reduced, _) = self.reduced(&self.scaled_hessian());
         self.fill_held(&mut reduced);
         let eigenvalues = eigen(reduced)?.eigenvalues;
-        if eigenvalues.min() <= RANK_TOLERANCE * eigenvalues.max() {
+        if eigenvalues.min() <= RANK_TOLERANCE * eigenvalues.max() || self.freezes() {
             return None;
         }
         // Inverted around the pivot, where it is well conditioned, and then moved to the camera

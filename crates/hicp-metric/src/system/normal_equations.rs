@@ -214,6 +214,13 @@ impl NormalEquations {
         self.variance = self.variance.or(variance);
     }
 
+    /// Returns the system with another JᵀWr in scaled unknowns.
+    pub(crate) fn with_gradient(mut self, gradient: &Vector6<f64>) -> Self {
+        let change = gradient - self.scaled_gradient();
+        self.sums.add(&Matrix6::zeros(), &change, 0.0);
+        self
+    }
+
     /// Multiplies every weight, and with them a known variance of the residuals, by a factor.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {

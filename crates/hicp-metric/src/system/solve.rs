@@ -76,18 +76,40 @@ impl NormalEquations {
         if self.rows < n_free || !finite || mean_diagonal <= 0.0 {
             return None;
         }
-        let y = match self.policy {
-            Degeneracy::Damp => self.factored(DAMPING * mean_diagonal, lambda)?,
-            Degeneracy::Freeze => self.remapped(lambda)?,
-            Degeneracy::FreezeRotations => self.marginalized(lambda, f64::INFINITY)?,
-            Degeneracy::FreezeUnexplained => self.marginalized(lambda, EXPLAINED)?,
-            Degeneracy::Refuse if self.is_degenerate()? => return None,
-            Degeneracy::Refuse | Degeneracy::Ignore => self.factored(0.0, lambda)?,
-        };
+        let y = self.unknowns(lambda)?;
         let increment = self.increment(&y);
         se3::is_finite(&increment).then_some(Solution {
             increment,
             size: y.norm() / self.length,
+        })
+    }
+
+    /// Returns the unknowns of the policy, with Marquardt's damping.
+    fn unknowns(&self, lambda: f64) -> Option<Vector6<f64>> {
+        match self.policy {
+            Degeneracy::Damp => self.factored(DAMPING * self.damping_trace() / 6.0, lambda),
+            Degeneracy::Freeze => self.remapped(lambda),
+            Degeneracy::FreezeRotations => self.marginalized(lambda, f64::INFINITY),
+            Degeneracy::FreezeUnexplained => self.marginalized(lambda, EXPLAINED),
+            Degeneracy::Refuse if self.is_degenerate()? => None,
+            Degeneracy::Refuse | Degeneracy::Ignore => self.factored(0.0, lambda),
+        }
+    }
+
+    /// Returns whether the policy freezes a free direction, or refuses a step because of it.
+    ///
+    /// If not, the step to the minimum reaches any displacement of it.
+    pub(crate) fn freezes(&self) -> bool {
+        if matches!(self.policy, Degeneracy::Damp | Degeneracy::Ignore) {
+            return false;
+        }
+        let hessian = self.scaled_hessian() * self.basis();
+        (0..6).filter(|&i| !self.held(i)).any(|i| {
+            let displaced = self.with_gradient(&-hessian.column(i));
+            let mut missed = displaced.unknowns(0.0).unwrap_or_default();
+            missed[i] -= 1.0;
+            // Rounding is far below, and a frozen direction misses a sixth or more for some i.
+            missed.amax() > 1e-2
         })
     }
 

@@ -288,8 +288,8 @@ class Result(_Record):
         ξ = [ρ; φ], a left perturbation in the camera frame, translation first (meters, radians).
         The variance of the residuals is left out: a pose graph needs the inverse of `covariance`.
     covariance : numpy.ndarray, shape (6, 6), float64, or None
-        Covariance of the pose in the same convention; None if a direction is not determined. It
-        holds if the pairs are right and the residuals are independent.
+        Covariance of the pose in the same convention; None if a direction is not determined, or was
+        frozen by the metric. It holds if the pairs are right and the residuals are independent.
     stages : list of StageEvent
         The ICP stages that ran, in order.
     model : Model or None
@@ -423,8 +423,8 @@ class Alignment(_Record):
     rmse : float or None
         Root mean square of the distances of pairs, meters; None without pairs.
     covariance : numpy.ndarray, shape (6, 6), float64, or None
-        Covariance of the pose; None if a direction is not determined. Translation first, meters and
-        radians; a left perturbation in the frame of the target.
+        Covariance of the pose; None if a direction is not determined, or was frozen. Translation
+        first, meters and radians; a left perturbation in the frame of the target.
     warnings : list of str
         Reasons not to trust the pose, and notes on the preparation of the clouds, such as
         normals that were estimated, as sentences; empty if there are none.

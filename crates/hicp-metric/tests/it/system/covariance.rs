@@ -4,7 +4,7 @@ use crate::scenes::{Numbers, carried, center, ellipsoid, exact, messy};
 use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Matrix6, Point3, Surfel, Vector3, Vector6, se3};
 use hicp_metric::Minimize;
-use hicp_metric::{NormalEquations, PointToPlane, PointToPoint};
+use hicp_metric::{Degeneracy, NormalEquations, PointToPlane, PointToPoint};
 
 const TRIALS: u32 = 4000;
 
@@ -275,4 +275,69 @@ fn undetermined_poses_have_no_covariance() {
             .covariance()
             .is_some()
     );
+}
+
+/// A policy does not minimize along a direction that it freezes, so no variance is known there.
+#[test]
+fn a_direction_that_a_policy_freezes_has_no_covariance() {
+    let mut numbers = Numbers(97);
+    // A can whose normals waver: its rotation around z has about 10⁻⁴ of the information.
+    let can: Vec<_> = (0..300)
+        .map(|i| {
+            let around = Vector3::new(numbers.gaussian(), numbers.gaussian(), 0.0).normalize();
+            let side = Vector3::z() * numbers.sign() + around;
+            let cap = Vector3::z() + around * numbers.unit();
+            let waver = Vector3::z().cross(&around) * (0.01 * numbers.sign());
+            let (offset, normal) = if i % 3 == 0 {
+                (cap, Vector3::z())
+            } else {
+                (side, (around + waver).normalize())
+            };
+            crate::scenes::surfel(center() + offset * 0.05, normal)
+        })
+        .collect();
+    let mut pairs = exact(&can, &Isometry3::identity());
+    for pair in pairs.as_mut_slice() {
+        let along = pair.target.normal.cast::<f64>().into_inner();
+        pair.target.point += (along * (5e-4 * numbers.gaussian())).cast::<f32>();
+    }
+    let policies = [
+        Degeneracy::Damp,
+        Degeneracy::Ignore,
+        Degeneracy::Freeze,
+        Degeneracy::FreezeRotations,
+        Degeneracy::Refuse,
+    ];
+    let free = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
+    let mut held = free;
+    let axes = Isometry3::identity().rotation;
+    held.freeze(&axes, &center(), [false; 3], [false, false, true]);
+    for (policy, freezes) in policies.into_iter().zip([false, false, true, true, true]) {
+        for threshold in [Degeneracy::THRESHOLD, 1e-7] {
+            let system = free.with_policy(policy, threshold);
+            // By the definition: a step that does not go around z, or that there is not.
+            let turn = system
+                .solve()
+                .map_or(0.0, |step| step.rotation.scaled_axis().z);
+            let moves = turn.abs() > 1e-3;
+            assert_eq!(
+                moves,
+                !freezes || threshold < 1e-6,
+                "{policy:?} {threshold}: {turn}"
+            );
+            assert_eq!(
+                system.covariance().is_some(),
+                moves,
+                "{policy:?} {threshold}"
+            );
+            if moves {
+                assert_eq!(system.covariance(), free.covariance());
+            }
+        }
+        // A component that the caller froze is not free.
+        assert!(
+            held.with_policy(policy, 1e-3).covariance().is_some(),
+            "{policy:?}"
+        );
+    }
 }
