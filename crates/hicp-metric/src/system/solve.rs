@@ -103,6 +103,11 @@ impl NormalEquations {
         if matches!(self.policy, Degeneracy::Damp | Degeneracy::Ignore) {
             return false;
         }
+        if self.policy == Degeneracy::FreezeUnexplained {
+            // A rotation between the two thresholds stays until it explains enough.
+            let strict = self.with_policy(Degeneracy::FreezeRotations, self.threshold);
+            return strict.freezes();
+        }
         let hessian = self.scaled_hessian() * self.basis();
         (0..6).filter(|&i| !self.held(i)).any(|i| {
             let displaced = self.with_gradient(&-hessian.column(i));
