@@ -41,8 +41,8 @@ pub enum Facing {
 ///
 /// Coordinates are finite, indices are valid, and at least one triangle has an area;
 /// [`TriMesh::new`] refuses anything else. Unused vertices and triangles of zero area may exist.
-/// They affect nothing but [`TriMesh::vertices`], [`TriMesh::triangles`] and the time of renders: an
-/// unused vertex far from the object makes their regions larger.
+/// They affect nothing but [`TriMesh::vertices`], [`TriMesh::triangles`] and the time of renders:
+/// an unused vertex far from the object makes their regions larger.
 ///
 /// ```
 /// use hicp_core::{Point3, TriMesh};
