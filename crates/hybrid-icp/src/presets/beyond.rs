@@ -170,7 +170,7 @@ pub(crate) fn fit_of(iterations: usize) -> Fit {
         filter: (),
         metric: Conditioned {
             metric: PointToPlane,
-            policy: Degeneracy::FreezeUnexplained,
+            policy: Degeneracy::FreezeRotations,
             threshold: UNDETERMINED,
         },
         stop: (Convergence::default(), IterationLimit(iterations)),
@@ -210,14 +210,18 @@ pub(crate) fn far() -> Far {
 ///
 /// The score is the MVE for the masks of detectors ([`MeanVsd::imperfect_mask`]). The first stage
 /// renders the model in each iteration, and fits the depth along the rays ([`RenderedSurface`]) and
-/// the silhouette ([`Contour`]). Depths count up to a difference of 0.12 diameters. If the
-/// [`Doubt`] is then 0.1 or more, the same stage runs with 0.25 diameters. Then
-/// [`SwitchUntilStall`] runs up to six steps, until the score stalls, and keeps the pose with the
-/// lowest one. A step starts with the projective cascade if the estimate agrees with the image.
-/// Otherwise it pairs observed points with the model, first with point-to-point and then with the
-/// symmetric metric. It ends with four iterations of the first stage.
+/// the silhouette ([`Contour`]). Depths count up to a difference of 0.12 diameters. This first
+/// stage solves rotations with little information if they explain the residuals. If the [`Doubt`]
+/// is then 0.1 or more, the same stage runs with 0.25 diameters. Then [`SwitchUntilStall`] runs up
+/// to six steps, until the score stalls, and keeps the pose with the lowest one. A step starts with
+/// the projective cascade if the estimate agrees with the image. Otherwise it pairs observed points
+/// with the model, first with point-to-point and then with the symmetric metric. It ends with four
+/// iterations of the first stage.
 #[must_use]
 pub fn local() -> Local {
+    let mut first = fit();
+    // Only here: with it in the fits of doubtful poses, a search missed more mugs.
+    first.metric.policy = Degeneracy::FreezeUnexplained;
     let short = fit_of(4);
     let steps = SwitchUntilStall {
         switcher: Threshold {
@@ -231,7 +235,7 @@ pub fn local() -> Local {
         good_enough: 0.1,
     };
     Cascade((
-        guarded(fit()),
+        guarded(first),
         Switch {
             switcher: Threshold {
                 score: Doubt,

@@ -10,7 +10,6 @@ use hicp_icp::{
     Cascade, IterationLimit, LookAlikeCount, Outcome, SearchOptions, Session, Stage, Verdict,
     Workspace,
 };
-use hicp_metric::Degeneracy;
 use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, MeanVsd, SampledMve, Score};
 
@@ -61,8 +60,6 @@ pub(super) struct Matcher {
 impl Matcher {
     pub(super) fn new(model: Arc<Model>, camera: PinholeCamera) -> Self {
         let mut near = fit();
-        // The facets of a mesh explain rotations that a smooth object does not show.
-        near.metric.policy = Degeneracy::FreezeRotations;
         near.association.0.stride = Stride::AboutPoints(POINTS);
         near.association.1.lines = LINES;
         Self {
