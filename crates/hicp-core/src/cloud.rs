@@ -4,6 +4,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::derived::Derived;
 use crate::id::Id;
+use crate::internal::centroid;
 use crate::object::diameter::diameter;
 use crate::object::mesh::MAX_COORDINATE_METERS;
 use crate::surfel::Surfel;
@@ -26,6 +27,7 @@ pub struct Cloud {
     id: Id,
     surfels: Vec<Surfel>,
     n_skipped: usize,
+    center: Point3<f64>,
     neighbors: Option<usize>,
     derived: Derived,
 }
@@ -71,6 +73,7 @@ impl Cloud {
         Self {
             id: Id::next(),
             n_skipped: n_given - surfels.len(),
+            center: centroid(&surfels).unwrap_or_default(),
             surfels,
             neighbors: None,
             derived: Derived::default(),
@@ -109,6 +112,12 @@ impl Cloud {
     #[must_use]
     pub fn normals_from(&self) -> Option<usize> {
         self.neighbors
+    }
+
+    /// Mean of the points, meters; the origin without points.
+    #[must_use]
+    pub fn center(&self) -> Point3<f64> {
+        self.center
     }
 
     /// Largest distance between two points, meters; 0 without points.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 
 use crate::cloud::Cloud;
 use crate::derived::Derived;
@@ -37,6 +37,15 @@ impl<'a> Source<'a> {
         match self {
             Self::Model(model) => model.diameter(),
             Self::Cloud(cloud) => cloud.diameter(),
+        }
+    }
+
+    /// The center of the model's bounding box, or the mean of a cloud's points, meters.
+    #[must_use]
+    pub fn center(&self) -> Point3<f64> {
+        match self {
+            Self::Model(model) => model.center(),
+            Self::Cloud(cloud) => cloud.center(),
         }
     }
 

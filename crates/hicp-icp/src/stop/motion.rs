@@ -1,9 +1,27 @@
 //! Stop rules on the motion of the pose.
 
-use hicp_core::{Isometry3, Iteration, se3};
+use hicp_core::{Isometry3, Iteration, Point3, Problem, Translation3, se3};
 
 use crate::outcome::Termination;
 use crate::stop::stop_rule::{Judgment, Progress, StopRule};
+
+/// Returns the rotation angle, degrees, and the distance of the object's center, meters, between
+/// two poses.
+///
+/// The origin of the object's frame may be far from the object, where a small rotation moves it a
+/// long way. It is the center only if there is no source.
+pub(crate) fn object_motion(
+    problem: &Problem<'_>,
+    a: &Isometry3<f64>,
+    b: &Isometry3<f64>,
+) -> (f64, f64) {
+    let center = problem
+        .source()
+        .map_or_else(Point3::origin, |source| source.center());
+    let at_center = Translation3::from(center);
+    let (angle, distance) = se3::pose_distance(&(a * at_center), &(b * at_center));
+    (angle.to_degrees(), distance)
+}
 
 /// Ends a stage as converged if the next increment would hardly move the object.
 ///
@@ -42,7 +60,7 @@ impl StopRule for SmallMotion {
 
 /// Rejects a pose that is too far from the stage's initial pose.
 ///
-/// A wrong match must not move a good detection away. The distance is that of the object's origin.
+/// A wrong match must not move a good detection away. The distance is that of the object's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bound {
     /// Largest distance, meters.
@@ -62,17 +80,23 @@ impl Default for Bound {
 }
 
 impl Bound {
-    /// Returns whether a pose lies within the bound around an initial pose.
+    /// Returns whether a pose of the problem's source lies within the bound around an initial pose.
     #[must_use]
-    pub fn contains(&self, init: &Isometry3<f64>, pose: &Isometry3<f64>) -> bool {
-        let (angle, distance) = se3::pose_distance(pose, init);
-        distance <= self.translation_meters && angle.to_degrees() <= self.rotation_degrees
+    pub fn contains(
+        &self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        pose: &Isometry3<f64>,
+    ) -> bool {
+        let (degrees, meters) = object_motion(problem, pose, init);
+        meters <= self.translation_meters && degrees <= self.rotation_degrees
     }
 }
 
 impl StopRule for Bound {
     fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
-        if self.contains(&iteration.init, progress.camera_from_object) {
+        let pose = progress.camera_from_object;
+        if self.contains(&iteration.problem, &iteration.init, pose) {
             Judgment::Continue
         } else {
             Judgment::Reject(Termination::OutOfBounds)
@@ -161,7 +185,7 @@ mod tests {
             n_pairs: 10,
             mean_loss: 1.0,
         };
-        let iteration = Iteration::new(0, &at(0.0), hicp_core::Problem::default());
+        let iteration = Iteration::new(0, &at(0.0), Problem::default());
         rule.check(
             &iteration,
             &Progress {

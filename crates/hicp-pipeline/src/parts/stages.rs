@@ -284,10 +284,11 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
         )?,
         ..SearchOptions::default()
     };
-    let far = "largest distance of the result from the initial pose";
+    let moved = "largest distance of the object's center from that of the initial pose";
+    let turned = "largest rotation from the initial pose";
     let bound = Bound {
-        translation_meters: p.number("max_translation_meters", METERS, INFINITY, far)?,
-        rotation_degrees: p.number("max_rotation_degrees", DEGREES, INFINITY, far)?,
+        translation_meters: p.number("max_translation_meters", METERS, INFINITY, moved)?,
+        rotation_degrees: p.number("max_rotation_degrees", DEGREES, INFINITY, turned)?,
     };
     let bounded = bound.translation_meters.is_finite() || bound.rotation_degrees.is_finite();
     let time = "time after which a search ends; if finite, results depend on the clock";

@@ -56,10 +56,9 @@ pub(super) fn add(catalog: &mut Catalog) {
     });
     catalog.add_stop_rule("bound", |p| {
         p.about = "Rejects a pose too far from the stage's initial one. Cost: O(1).";
-        let (translation_meters, rotation_degrees) = motion(p, 0.1, 45.0)?;
         Ok(Bound {
-            translation_meters,
-            rotation_degrees,
+            translation_meters: p.number("translation_meters", METERS, 0.1, "of the center")?,
+            rotation_degrees: p.number("rotation_degrees", DEGREES, 45.0, "angle")?,
         })
     });
     catalog.add_stop_rule("oscillation", |p| {

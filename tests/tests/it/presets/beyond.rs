@@ -2,7 +2,7 @@
 //!
 //! - `local` never raises the score of imperfect masks.
 //! - `search` and `auto` leave the pose of `local` only for one that they score better.
-//! - A bounded search stays in its bound.
+//! - A bounded search stays in its bound, wherever the origin of the mesh is.
 //! - A search finds the object, or an equivalent pose.
 
 use std::collections::BTreeMap;
@@ -12,7 +12,8 @@ use std::time::Duration;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, perturbed_scene, scene};
 use hybrid_icp::core::{
-    Isometry3, Model, ModelConfig, Observation, Point3, Problem, UnitQuaternion, Vector3, se3,
+    Isometry3, Model, ModelConfig, Observation, Point3, Problem, TriMesh, UnitQuaternion, Vector3,
+    se3,
 };
 use hybrid_icp::icp::{
     Bound, HypothesisSearch, Rotations, SearchOptions, Session, Stage, Start, Termination, Verdict,
@@ -97,8 +98,41 @@ proptest! {
         };
         let mut refiner = Refiner::new(presets::search_with(options));
         let refined = refiner.refine(&scene.model, &scene.observation, &init);
-        let (turned, moved) = se3::pose_distance(&refined.outcome.camera_from_object, &init);
-        prop_assert!(moved <= translation_meters && turned.to_degrees() <= rotation_degrees);
+        let pose = refined.outcome.camera_from_object;
+        let center = scene.model.center();
+        let (moved, (turned, _)) = (pose * center - init * center, se3::pose_distance(&pose, &init));
+        prop_assert!(moved.norm() <= translation_meters && turned.to_degrees() <= rotation_degrees);
+    }
+}
+
+/// A rotation of an object moves an origin far from it by much more than a bound allows.
+#[test]
+fn a_bounded_search_does_not_depend_on_the_origin_of_the_mesh() {
+    let scene = scene(Household::Pan, 0.0, &mut rng(0));
+    let turn = UnitQuaternion::new(Vector3::new(0.44, -0.53, 0.55));
+    let init = Isometry3::translation(0.008, -0.005, 0.01)
+        * scene.truth
+        * Isometry3::rotation_wrt_point(turn, scene.model.center());
+    let options = SearchOptions {
+        bound: Some(Bound {
+            translation_meters: 0.05,
+            rotation_degrees: 60.0,
+        }),
+        // All hypotheses come from the image and are moved into the bound.
+        start: Start::Ignored,
+        ..SearchOptions::default()
+    };
+    for meters in [0.0, 0.5, 10.0] {
+        let shift = Isometry3::translation(meters, -0.7 * meters, 0.3 * meters);
+        let mesh = scene.model.mesh();
+        let vertices = mesh.vertices().iter();
+        let vertices = vertices.map(|p| (shift * p.cast::<f64>()).cast()).collect();
+        let model = Model::new(TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap());
+        let mut refiner = Refiner::new(presets::search_with(options));
+        let found = refiner.refine(&model, &scene.observation, &(init * shift.inverse()));
+        let pose = found.outcome.camera_from_object * shift;
+        let (angle, distance) = se3::pose_distance(&pose, &scene.truth);
+        assert!(angle < 1e-4 && distance < 1e-5, "{meters} m: {found:?}");
     }
 }
 

@@ -31,6 +31,7 @@ const PLACING_SURFELS: usize = 600;
 
 /// The source of the hypotheses of one search.
 pub(crate) struct Hypotheses<'a> {
+    problem: Problem<'a>,
     model: &'a Model,
     init: Isometry3<f64>,
     bound: Option<Bound>,
@@ -52,6 +53,7 @@ impl<'a> Hypotheses<'a> {
         let centroid = observed_centroid(observation)?;
         let ray = centroid.coords.try_normalize(f64::EPSILON)?;
         se3::is_finite(init).then(|| Self {
+            problem: *problem,
             model,
             init: *init,
             bound,
@@ -89,7 +91,7 @@ impl<'a> Hypotheses<'a> {
         let pose = Isometry3::from_parts(translation, *rotation);
         let bound = self.bound;
         bound
-            .is_none_or(|bound| bound.contains(&self.init, &pose))
+            .is_none_or(|bound| bound.contains(&self.problem, &self.init, &pose))
             .then_some(pose)
     }
 
@@ -161,6 +163,8 @@ impl<'a> Hypotheses<'a> {
 
     /// Places a rotation such that the visible centroid is the observed one, within the bound.
     ///
+    /// A bound limits the distance of the model's center.
+    ///
     /// Returns `None` if the rotation is outside of the bound.
     fn place(&self, rotation: &UnitQuaternion<f64>) -> Option<Isometry3<f64>> {
         // Check the rotation before placing it: most of the grid of a bounded search ends here.
@@ -176,11 +180,12 @@ impl<'a> Hypotheses<'a> {
             .centroid;
         let mut translation = self.centroid - rotation * seen;
         if let Some(bound) = self.bound {
-            let initial = self.init.translation.vector;
-            let step = translation - initial;
+            let center = rotation * self.model.center().coords;
+            let initial = (self.init * self.model.center()).coords;
+            let step = translation + center - initial;
             let limit = bound.translation_meters;
             if step.norm() > limit {
-                translation = initial + step * (limit / step.norm());
+                translation = initial + step * (limit / step.norm()) - center;
             }
         }
         Some(Isometry3::from_parts(

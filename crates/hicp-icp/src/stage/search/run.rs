@@ -49,7 +49,7 @@ impl Run<'_, '_> {
     /// Returns whether a pose lies within the bound.
     pub(crate) fn allows(&self, pose: &Isometry3<f64>) -> bool {
         let bound = self.options.bound;
-        bound.is_none_or(|bound| bound.contains(self.init, pose))
+        bound.is_none_or(|bound| bound.contains(self.problem, self.init, pose))
     }
 
     /// Returns whether the observer or the time limit ends the search.
