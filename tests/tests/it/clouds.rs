@@ -179,6 +179,27 @@ fn clouds_far_from_their_origin_cause_a_warning() {
     assert_eq!((coarse(&near), coarse(&far)), (0, 2));
 }
 
+/// A rotation of a cloud moves an origin far from it by much more than the stop rule allows.
+#[test]
+fn the_number_of_iterations_does_not_depend_on_the_origin() {
+    let truth = pose([0.05, -0.04, 0.06], [0.004, 0.003, -0.005]);
+    for kind in Registration::ALL {
+        let [near, far @ ..] = [0.0, 10.0, 100.0].map(|meters| {
+            let shift = Isometry3::translation(meters, -0.7 * meters, 0.3 * meters);
+            let [source, target] = [(1200, shift), (1500, shift * truth)]
+                .map(|(n, pose)| cloud(&moved(&points(n), &pose)));
+            let found = aligned(kind, &source, &target);
+            assert_eq!(found.outcome.termination, Termination::Converged);
+            found.outcome.iterations
+        });
+        // The coordinates are rounded to `f32`, in steps of up to 8 µm.
+        assert!(
+            far.iter().all(|n| *n <= near + 5),
+            "{kind:?}: {near} {far:?}"
+        );
+    }
+}
+
 /// Two spheres determine no rotation. Noise makes it look as if they did.
 #[test]
 fn spheres_have_no_covariance() {

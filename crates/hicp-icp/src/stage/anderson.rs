@@ -8,6 +8,7 @@ use nalgebra::{Matrix5, Matrix6x5, Vector5};
 use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::stage_trait::Stage;
+use crate::stop::motion::object_motion;
 
 /// Number of previous steps that determine an extrapolation.
 const MEMORY: usize = 5;
@@ -40,7 +41,7 @@ pub struct Anderson<S> {
     pub stage: S,
     /// Maximum number of steps.
     pub max_steps: usize,
-    /// The iteration has converged if a step moves the object's origin by less than this, meters …
+    /// The iteration has converged if a step moves the object's center by less than this, meters …
     pub translation_meters: f64,
     /// … and rotates the object by less than this, degrees.
     pub rotation_degrees: f64,
@@ -108,9 +109,8 @@ impl<S: Stage> Stage for Anderson<S> {
                 best.get_or_insert((step, f64::INFINITY));
                 break;
             };
-            let (angle, distance) = se3::pose_distance(&step.camera_from_object, &start);
-            let still =
-                distance < self.translation_meters && angle.to_degrees() < self.rotation_degrees;
+            let (degrees, meters) = object_motion(problem, &step.camera_from_object, &start);
+            let still = meters < self.translation_meters && degrees < self.rotation_degrees;
             let next = memory.extrapolate(&twist(&start), &twist(&step.camera_from_object));
             best = Some((step, loss));
             if stopped || still {

@@ -1,4 +1,4 @@
-//! Stop rules on the motion of the pose.
+//! Stop rules on the motion of the object.
 
 use hicp_core::{Isometry3, Iteration, Point3, Problem, Translation3, se3};
 
@@ -25,7 +25,7 @@ pub(crate) fn object_motion(
 
 /// Ends a stage as converged if the next increment would hardly move the object.
 ///
-/// Both its distance, that of the object's origin, *and* its angle must be below their limits.
+/// Both its distance, that of the object's center, *and* its angle must be below their limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmallMotion {
     /// Distance, meters.
@@ -45,11 +45,11 @@ impl Default for SmallMotion {
 }
 
 impl StopRule for SmallMotion {
-    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
-        let next = progress.increment * progress.camera_from_object;
-        let (angle, distance) = se3::pose_distance(&next, progress.camera_from_object);
-        let still =
-            distance < self.translation_meters && angle.to_degrees() < self.rotation_degrees;
+    fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+        let pose = progress.camera_from_object;
+        let next = progress.increment * pose;
+        let (degrees, meters) = object_motion(&iteration.problem, &next, pose);
+        let still = meters < self.translation_meters && degrees < self.rotation_degrees;
         Judgment::accept_if(still, Termination::Converged)
     }
 
@@ -111,7 +111,7 @@ impl StopRule for Bound {
 /// Ends a stage whose pose returns to that of two or three iterations before.
 ///
 /// Correspondences then flip back and forth. The stage ends with [`Termination::Oscillating`] and
-/// accepts the last evaluated pose. The distance is that of the object's origin.
+/// accepts the last evaluated pose. The distance is that of the object's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillation {
     /// Distance within which two poses are equal, meters.
@@ -133,9 +133,9 @@ impl Oscillation {
         }
     }
 
-    fn same(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
-        let (angle, distance) = se3::pose_distance(a, b);
-        distance <= self.translation_meters && angle.to_degrees() <= self.rotation_degrees
+    fn same(&self, problem: &Problem<'_>, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+        let (degrees, meters) = object_motion(problem, a, b);
+        meters <= self.translation_meters && degrees <= self.rotation_degrees
     }
 }
 
@@ -151,12 +151,13 @@ impl StopRule for Oscillation {
         self.recent = [None; 3];
     }
 
-    fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
+    fn check(&mut self, iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
         let pose = progress.camera_from_object;
+        let same = |other: &Isometry3<f64>| self.same(&iteration.problem, other, pose);
         let [last, older @ ..] = &self.recent;
         // A pose that does not move has converged and does not oscillate.
-        let moved = last.is_some_and(|last| !self.same(&last, pose));
-        let returned = older.iter().flatten().any(|before| self.same(before, pose));
+        let moved = last.is_some_and(|last| !same(&last));
+        let returned = older.iter().flatten().any(same);
         self.recent.rotate_right(1);
         self.recent[0] = Some(*pose);
         Judgment::accept_if(moved && returned, Termination::Oscillating)
@@ -171,6 +172,7 @@ impl StopRule for Oscillation {
 mod tests {
     use super::*;
     use crate::outcome::Evaluation;
+    use hicp_core::{Cloud, UnitQuaternion, Vector3};
 
     fn at(x: f64) -> Isometry3<f64> {
         Isometry3::translation(x, 0.0, 0.5)
@@ -181,11 +183,20 @@ mod tests {
         pose: &Isometry3<f64>,
         increment: &Isometry3<f64>,
     ) -> Judgment {
+        check_in(&Problem::default(), rule, pose, increment)
+    }
+
+    fn check_in(
+        problem: &Problem<'_>,
+        rule: &mut dyn StopRule,
+        pose: &Isometry3<f64>,
+        increment: &Isometry3<f64>,
+    ) -> Judgment {
         let current = Evaluation {
             n_pairs: 10,
             mean_loss: 1.0,
         };
-        let iteration = Iteration::new(0, &at(0.0), Problem::default());
+        let iteration = Iteration::new(0, &at(0.0), *problem);
         rule.check(
             &iteration,
             &Progress {
@@ -202,7 +213,7 @@ mod tests {
     #[test]
     fn small_motion_needs_a_small_distance_and_a_small_angle() {
         let mut rule = SmallMotion::default();
-        let turn = Isometry3::rotation(hicp_core::Vector3::z() * 1e-3);
+        let turn = Isometry3::rotation(Vector3::z() * 1e-3);
         let judge = |rule: &mut SmallMotion, increment| check(rule, &at(0.0), &increment);
         assert_ne!(
             judge(&mut rule, Isometry3::translation(0.9e-4, 0.0, 0.0)),
@@ -224,8 +235,7 @@ mod tests {
     #[test]
     fn limits_are_meters_and_degrees_not_squares_or_cosines() {
         let origin = Isometry3::identity();
-        let turn =
-            |degrees: f64| Isometry3::rotation(hicp_core::Vector3::y() * degrees.to_radians());
+        let turn = |degrees: f64| Isometry3::rotation(Vector3::y() * degrees.to_radians());
         let shift = |meters: f64| Isometry3::translation(0.0, meters, 0.0);
         for (meters, degrees) in [(1e-4, 0.01), (0.02, 3.0), (0.5, 170.0)] {
             let mut motion = SmallMotion {
@@ -266,6 +276,31 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The object is 1 km from the origin of its frame, which the rotation moves by 9 mm.
+    #[test]
+    fn distances_are_those_of_the_center() {
+        let center = Point3::new(600.0, 0.0, 800.0);
+        let cloud = Cloud::without_normals([center.cast()]);
+        let problem = Problem::new(&cloud, &cloud);
+        let (pose, turn) = (at(0.0), Vector3::y() * f64::to_radians(5e-4));
+        let turned = pose * Isometry3::rotation_wrt_point(UnitQuaternion::new(turn), center);
+        let increment = turned * pose.inverse();
+        let check = |rule: &mut dyn StopRule, pose: &Isometry3<f64>| {
+            check_in(&problem, rule, pose, &increment)
+        };
+        let mut motion = SmallMotion::default();
+        assert_ne!(check(&mut motion, &pose), Judgment::Continue);
+        let mut bound = Bound {
+            translation_meters: 1e-6,
+            ..Bound::default()
+        };
+        assert_eq!(check(&mut bound, &turned), Judgment::Continue);
+        let mut oscillation = Oscillation::default();
+        assert_eq!(check(&mut oscillation, &pose), Judgment::Continue);
+        assert_eq!(check(&mut oscillation, &at(0.1)), Judgment::Continue);
+        assert_ne!(check(&mut oscillation, &turned), Judgment::Continue);
     }
 
     #[test]

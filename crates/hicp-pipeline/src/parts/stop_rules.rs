@@ -56,9 +56,10 @@ pub(super) fn add(catalog: &mut Catalog) {
     });
     catalog.add_stop_rule("bound", |p| {
         p.about = "Rejects a pose too far from the stage's initial one. Cost: O(1).";
+        let (translation_meters, rotation_degrees) = motion(p, 0.1, 45.0)?;
         Ok(Bound {
-            translation_meters: p.number("translation_meters", METERS, 0.1, "of the center")?,
-            rotation_degrees: p.number("rotation_degrees", DEGREES, 45.0, "angle")?,
+            translation_meters,
+            rotation_degrees,
         })
     });
     catalog.add_stop_rule("oscillation", |p| {
@@ -83,10 +84,10 @@ pub(super) fn add(catalog: &mut Catalog) {
     });
 }
 
-/// A distance of the object's origin and an angle.
+/// A distance of the object's center and an angle.
 fn motion(p: &mut Parameters<'_>, meters: f64, degrees: f64) -> Result<(f64, f64), PipelineError> {
     Ok((
-        p.number("translation_meters", METERS, meters, "of the origin")?,
+        p.number("translation_meters", METERS, meters, "of the center")?,
         p.number("rotation_degrees", DEGREES, degrees, "angle")?,
     ))
 }
