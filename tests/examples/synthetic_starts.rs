@@ -34,6 +34,8 @@ fn main() {
         Preset::ALL.map(|preset| (preset, Refiner::preset(preset), Column::default()));
     for Start { scene, init } in starts(STARTS_PER_OBJECT, noise) {
         let points = ModelPoints::new(&scene.model);
+        // No time includes what is derived from the model, once per model.
+        Refiner::preset(Preset::Search).refine(&scene.model, &scene.observation, &init);
         for (_, refiner, column) in &mut refiners {
             // A new observation for each preset, so that every time includes normals and search
             // trees.
