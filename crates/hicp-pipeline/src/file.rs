@@ -73,8 +73,8 @@ impl PipelineFile {
     ///
     /// # Errors
     ///
-    /// [`PipelineErrorKind::Override`] if the path leads nowhere. Whether a part has such a field
-    /// is checked by building.
+    /// [`PipelineErrorKind::Override`] if the path leads nowhere. A field that the part does not
+    /// have is refused by building.
     pub fn set(&mut self, assignment: &str) -> Result<(), PipelineError> {
         self.overrides.push(assignment.to_owned());
         let outcome = self.root().map(|_| ());

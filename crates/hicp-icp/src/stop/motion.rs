@@ -9,7 +9,7 @@ use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 /// two poses.
 ///
 /// The origin of the object's frame may be far from the object, where a small rotation moves it a
-/// long way. It is the center only if there is no source.
+/// long way. Without a source, the origin counts as the center.
 pub(crate) fn object_motion(
     problem: &Problem<'_>,
     a: &Isometry3<f64>,

@@ -36,8 +36,8 @@ pub enum Degeneracy {
     FreezeRotations,
     /// [`Self::FreezeRotations`], except for rotations that explain the residuals.
     ///
-    /// Such a rotation would remove more than 3 % of the loss. It stays only at a tenth of the
-    /// threshold. In an image with little noise, a small part of the surface or the silhouette can
+    /// Such a rotation would remove more than 3 % of the loss. Its threshold is a tenth of the
+    /// given one. In an image with little noise, a small part of the surface or the silhouette can
     /// determine a rotation that has little information.
     FreezeUnexplained,
     /// No step if a direction is degenerate, otherwise the undamped step.

@@ -23,8 +23,8 @@ pub struct NormalEquations {
     pub(crate) pivot: Point3<f64>,
     pub(crate) length: f64,
     inverse_length: f64,
-    /// Σ w over the pairs with rows, if [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all)
-    /// summed the system.
+    /// Σ w over the pairs with rows, if
+    /// [`ErrorMetric::linearize_all`](crate::ErrorMetric::linearize_all) summed the system.
     pub(crate) weight: Option<f64>,
     /// Variance of a residual of weight 1, if it is known instead of estimated.
     pub(crate) variance: Option<f64>,
