@@ -5,11 +5,12 @@
 //! of this crate.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
 use flate2::bufread::DeflateDecoder;
-use rawzip::{CompressionMethod, ZipArchive};
+use rawzip::{CompressionMethod, ZipArchive, ZipArchiveEntryWayfinder};
 
 use crate::error::{IoError, Place, quote};
 use crate::format::Format;
@@ -41,7 +42,11 @@ impl<'a> Array<'a> {
         names: &[&str],
     ) -> Result<Self, IoError> {
         match Format::of(content) {
-            Some(Format::Npz) => parse_npy(path, Cow::Owned(member(limits, path, content, names)?)),
+            Some(Format::Npz) => {
+                let archive = Archive::open(path, content)?;
+                let content = archive.extract(archive.find(names)?, limits.max_file_bytes)?;
+                parse_npy(path, Cow::Owned(content))
+            }
             _ => parse_npy(path, Cow::Borrowed(content)),
         }
     }
@@ -159,51 +164,109 @@ fn number_type(descr: &str) -> Option<NumberType> {
     Some(NumberType { kind, bytes })
 }
 
-/// Extracts the NPY file of one array from an archive.
-fn member(
-    limits: &ReadLimits,
+/// Returns the names and numbers of the arrays of an archive of several arrays.
+///
+/// Arrays of more than `most` numbers, and of other things, are left out.
+pub(crate) fn small_arrays(
     path: &Path,
     content: &[u8],
-    names: &[&str],
-) -> Result<Vec<u8>, IoError> {
-    let failed = |error: rawzip::Error| {
-        let found = "data that are not a complete zip archive";
-        IoError::new(path, None, found, "an NPZ file").with_source(error)
-    };
-    let archive = ZipArchive::from_slice(content).map_err(failed)?;
-    let (mut entries, mut arrays) = (archive.entries(), Vec::new());
-    while let Some(entry) = entries.next_entry().map_err(failed)? {
-        let name = String::from_utf8_lossy(entry.file_path().as_ref()).into_owned();
-        if let Some(name) = name.strip_suffix(".npy") {
-            let (place, method) = (entry.wayfinder(), entry.compression_method());
-            arrays.push((name.to_owned(), place, method));
+    most: usize,
+) -> Result<Option<BTreeMap<String, Vec<f64>>>, IoError> {
+    if Format::of(content) != Some(Format::Npz) {
+        return Ok(None);
+    }
+    let archive = Archive::open(path, content)?;
+    if archive.members.len() == 1 {
+        return Ok(None);
+    }
+    let mut arrays = BTreeMap::new();
+    for member in &archive.members {
+        // A header has at most 64 KiB.
+        let content = archive.extract(member, (1 << 16) + 8 * most as u64)?;
+        if let Ok(array) = parse_npy(path, Cow::Owned(content))
+            && array.shape.iter().product::<usize>() <= most
+        {
+            arrays.insert(member.name.clone(), array.numbers().collect());
         }
     }
-    let named = arrays.iter().find(|(name, ..)| names.contains(&&**name));
-    let only = arrays.first().filter(|_| arrays.len() == 1);
-    let Some((name, wayfinder, method)) = only.or(named) else {
-        let shown = arrays.iter().take(8).map(|(name, ..)| quote(name));
-        let shown: Vec<String> = shown.collect();
-        let found = format!("{} arrays: {}", arrays.len(), shown.join(", "));
-        let expected = format!("a single array, or one named {}", names.join(" or "));
-        return Err(IoError::new(path, None, found, expected));
-    };
-    let entry = archive.get_entry(*wayfinder).map_err(failed)?;
-    let mut array = Vec::new();
-    let most = limits.max_file_bytes;
-    let data = entry.data();
-    let read = match *method {
-        CompressionMethod::STORE => data.take(most).read_to_end(&mut array),
-        CompressionMethod::DEFLATE => DeflateDecoder::new(data).take(most).read_to_end(&mut array),
-        other => {
-            let found = format!("{other:?} compression");
-            let expected = "np.savez or np.savez_compressed";
-            return Err(IoError::new(path, None, found, expected));
+    Ok(Some(arrays))
+}
+
+/// An NPZ file: a zip archive of NPY files.
+struct Archive<'a> {
+    path: &'a Path,
+    zip: rawzip::ZipSliceArchive<&'a [u8]>,
+    members: Vec<Member>,
+}
+
+/// A file of an archive, named without `.npy`.
+struct Member {
+    name: String,
+    place: ZipArchiveEntryWayfinder,
+    method: CompressionMethod,
+}
+
+impl<'a> Archive<'a> {
+    fn open(path: &'a Path, content: &'a [u8]) -> Result<Self, IoError> {
+        let failed = |error| Self::not_complete(path, error);
+        let zip = ZipArchive::from_slice(content).map_err(failed)?;
+        let (mut entries, mut members) = (zip.entries(), Vec::new());
+        while let Some(entry) = entries.next_entry().map_err(failed)? {
+            let name = String::from_utf8_lossy(entry.file_path().as_ref()).into_owned();
+            if let Some(name) = name.strip_suffix(".npy") {
+                members.push(Member {
+                    name: name.to_owned(),
+                    place: entry.wayfinder(),
+                    method: entry.compression_method(),
+                });
+            }
         }
-    };
-    read.map_err(|error| {
-        let found = format!("the damaged array {}", quote(name));
+        Ok(Self { path, zip, members })
+    }
+
+    fn not_complete(path: &Path, error: rawzip::Error) -> IoError {
+        let found = "data that are not a complete zip archive";
         IoError::new(path, None, found, "an NPZ file").with_source(error)
-    })?;
-    Ok(array)
+    }
+
+    /// Returns the only array, or the one with a name of `names`.
+    fn find(&self, names: &[&str]) -> Result<&Member, IoError> {
+        if let [only] = &self.members[..] {
+            return Ok(only);
+        }
+        let mut members = self.members.iter();
+        let named = members.find(|member| names.contains(&&*member.name));
+        named.ok_or_else(|| {
+            let shown = self.members.iter().take(8);
+            let shown: Vec<String> = shown.map(|member| quote(&member.name)).collect();
+            let found = format!("{} arrays: {}", self.members.len(), shown.join(", "));
+            let expected = format!("a single array, or one named {}", names.join(" or "));
+            IoError::new(self.path, None, found, expected)
+        })
+    }
+
+    /// Extracts the first `most` bytes of the NPY file of an array.
+    fn extract(&self, member: &Member, most: u64) -> Result<Vec<u8>, IoError> {
+        let entry = self.zip.get_entry(member.place);
+        let entry = entry.map_err(|error| Self::not_complete(self.path, error))?;
+        let mut array = Vec::new();
+        let data = entry.data();
+        let read = match member.method {
+            CompressionMethod::STORE => data.take(most).read_to_end(&mut array),
+            CompressionMethod::DEFLATE => {
+                let data = DeflateDecoder::new(data);
+                data.take(most).read_to_end(&mut array)
+            }
+            other => {
+                let found = format!("{other:?} compression");
+                let expected = "np.savez or np.savez_compressed";
+                return Err(IoError::new(self.path, None, found, expected));
+            }
+        };
+        read.map_err(|error| {
+            let found = format!("the damaged array {}", quote(&member.name));
+            IoError::new(self.path, None, found, "an NPZ file").with_source(error)
+        })?;
+        Ok(array)
+    }
 }

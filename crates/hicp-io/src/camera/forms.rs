@@ -11,7 +11,7 @@ use crate::document::{self, numbers};
 use crate::error::{IoError, IoErrorKind, Place, quote};
 use crate::limits::ReadLimits;
 
-const EXPECTED: &str = "a camera as JSON, YAML, XML, text or NPY";
+const EXPECTED: &str = "a camera as JSON, YAML, XML, text, NPY or NPZ";
 
 /// The keys of a calibration matrix, and of numbers under several names.
 const MATRIX: [&str; 11] = [
@@ -43,7 +43,8 @@ const MODEL: [&str; 3] = ["distortion_model", "model", "camera_model"];
 ///   calibration matrix, the numbers are by columns, as in Open3D.
 /// - Text with four numbers: fx, fy, cx, cy.
 /// - ROS's `camera_info` as YAML or JSON, with `K`, `D` and the model.
-/// - OpenCV's YAML and XML with `camera_matrix` and `distortion_coefficients`.
+/// - OpenCV's YAML and XML with `camera_matrix` and `distortion_coefficients`, and NPZ with `mtx`
+///   and `dist`.
 /// - RealSense's and similar files with fx, fy, ppx and ppy. Of several streams, `depth` counts.
 /// - Open3D's `intrinsic_matrix`.
 ///

@@ -1,4 +1,4 @@
-//! Small files of numbers with names, as one JSON value: JSON, YAML, XML, text and NPY.
+//! Small files of numbers with names, as one JSON value: JSON, YAML, XML, text, NPY and NPZ.
 
 #[cfg(any(feature = "xml", feature = "yaml"))]
 mod scalar;
@@ -17,6 +17,8 @@ use crate::error::IoError;
 use crate::format::{self, Format};
 use crate::json;
 use crate::limits::{Limit, ReadLimits};
+#[cfg(feature = "npy")]
+use crate::npy;
 use crate::source::text_bytes;
 
 /// The largest count of numbers in an array, more than a matrix has.
@@ -26,13 +28,16 @@ const MOST_NUMBERS: usize = 1000;
 /// Reads a file by its first bytes.
 ///
 /// Text of numbers only becomes an array with an array for each line. An NPY array becomes a flat
-/// array of its numbers, by rows.
+/// array of its numbers, by rows, and an NPZ archive of several arrays an object of such arrays.
 pub(crate) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<Value, IoError> {
     let content = limits.read(path, Limit::SMALL_JSON_BYTES)?;
     match Format::of(&content) {
         #[cfg(feature = "npy")]
         Some(Format::Npy | Format::Npz) => {
-            let array = crate::npy::Array::parse(limits, path, &content, &["K", "pose", "T"])?;
+            if let Some(arrays) = npy::small_arrays(path, &content, MOST_NUMBERS)? {
+                return Ok(arrays.into_iter().collect());
+            }
+            let array = npy::Array::parse(limits, path, &content, &[])?;
             match array.shape.iter().product() {
                 0..=MOST_NUMBERS => Ok(array.numbers().map(Value::from).collect()),
                 count => {

@@ -16,7 +16,7 @@ use crate::unit::LengthUnit;
 const EXPECTED: &str = "`cam_R_m2c` and `cam_t_m2c`, a 4x4 matrix, R and t, t and rvec or a quaternion of stated \
                         order (quaternion_xyzw or quaternion_wxyz), or a TUM line (t x y z qx qy qz qw)";
 
-/// Reads a pose in any common form, as JSON, YAML, XML, text or NPY.
+/// Reads a pose in any common form, as JSON, YAML, XML, text, NPY or NPZ.
 ///
 /// - BOP's JSON, as [`read_pose_json`](crate::read_pose_json) reads it. Its translation is in millimeters.
 /// - A 4×4 or 3×4 matrix, by rows, also as the member `matrix`, `T` or `T_co` of an object.

@@ -39,6 +39,7 @@ fn distortions_are_read_with_their_models() {
     for (name, distortion) in [
         ("camera_opencv.yml", Distortion::BrownConrady(five)),
         ("camera_opencv.xml", Distortion::BrownConrady(five)),
+        ("camera_opencv.npz", Distortion::BrownConrady(five)),
         ("camera_ros_plumb_bob.yaml", Distortion::BrownConrady(five)),
         ("camera_ros_rational.yaml", Distortion::BrownConrady(eight)),
         ("camera_ros_equidistant.yaml", fisheye),
@@ -50,6 +51,8 @@ fn distortions_are_read_with_their_models() {
             "{name}"
         );
     }
+    let other = read_camera(fixture("depth_unnamed.npz"), (640, 480));
+    refused(other, &["no camera", "`camera_matrix`"]);
     let other = read_camera(fixture("camera_ros_thin_prism.yaml"), (640, 480));
     refused(other, &["\"thin_prism\" of 12 numbers", "undistort"]);
 }

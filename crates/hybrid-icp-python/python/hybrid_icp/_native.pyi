@@ -104,7 +104,7 @@ class Camera:
         Parameters
         ----------
         path : str or os.PathLike
-            JSON, YAML, XML, text or NPY.
+            JSON, YAML, XML, text, NPY or NPZ.
         size : (int, int)
             Width and height of the image, pixels. A size in the file must be the same.
 
@@ -1695,7 +1695,7 @@ def read_mask_png(path: _Path) -> npt.NDArray[np.bool_]:
     """
 
 def read_pose(path: _Path, *, unit: _Unit | None=None) -> _Array:
-    """Reads a pose from a JSON, YAML, text or NPY file.
+    """Reads a pose from a JSON, YAML, text, NPY or NPZ file.
 
     The file has a 4x4 or 3x4 matrix, BOP's `cam_R_m2c` and `cam_t_m2c`, a rotation and a
     translation, a translation and a quaternion of stated order, or a TUM line.

@@ -111,7 +111,7 @@ impl PyCamera {
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
-    ///     JSON, YAML, XML, text or NPY.
+    ///     JSON, YAML, XML, text, NPY or NPZ.
     /// size : (int, int)
     ///     Width and height of the image, pixels. A size in the file must be the same.
     ///

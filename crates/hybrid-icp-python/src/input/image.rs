@@ -139,7 +139,7 @@ pub(crate) fn read_mask(
     Ok(depth::image(file.mask.width(), file.mask.pixels()))
 }
 
-/// Reads a pose from a JSON, YAML, text or NPY file.
+/// Reads a pose from a JSON, YAML, text, NPY or NPZ file.
 ///
 /// The file has a 4x4 or 3x4 matrix, BOP's `cam_R_m2c` and `cam_t_m2c`, a rotation and a
 /// translation, a translation and a quaternion of stated order, or a TUM line.
