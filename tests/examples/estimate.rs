@@ -3,17 +3,17 @@
 //! Run `cargo run --release -p hicp-tests --example estimate [CASES] [tuning|test] [MASK]`.
 //!
 //! The images are those of `hicp_tests::tabletop`, and `MASK` is one of its kinds, `exact` if not
-//! given, or `box without plane`. A pose fails if its MSSD is above a tenth of the diameter, up to
-//! declared symmetries. The rough pose has the mean error of an estimator, 6.2 mm and 9.5°. Times
-//! are from the depth image to the pose on one core.
+//! given. A pose fails if its MSSD is above a tenth of the diameter, up to declared symmetries. The
+//! rough pose has the mean error of an estimator, 6.2 mm and 9.5°. Times are from the depth image
+//! to the pose on one core.
 
 use std::time::Instant;
 
 use hicp_sim::rng;
 use hicp_tests::tabletop::{MaskKind, Tabletop};
 use hicp_tests::{household, mean, median, points_of};
-use hybrid_icp::core::{Mask, Observation};
-use hybrid_icp::{Preset, Refiner, mask_in_box};
+use hybrid_icp::core::Observation;
+use hybrid_icp::{Preset, Refiner};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -23,7 +23,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let kinds = MaskKind::ALL.into_iter();
     let kind = kinds.clone().find(|kind| mask.starts_with(&kind.name()));
     let kind = kind.ok_or(format!("{mask}: not a kind of mask"))?;
-    let without_plane = mask == "box without plane";
     let stage = match arguments.next() {
         Some(name) => name.parse()?,
         None => Preset::Local,
@@ -44,10 +43,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let (depth, mask) = (seen.depth.clone(), observation.mask().clone());
                 let camera = *observation.camera();
                 let start = Instant::now();
-                let mask = match without_plane {
-                    true => mask_in_box(&depth, &camera, box_of(&mask)),
-                    false => mask,
-                };
                 let observation = Observation::new(depth, mask, camera)?;
                 let refined = match index {
                     0 => refiner.refine(model, &observation, &rough),
@@ -85,15 +80,4 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         1.96 * (estimated + searched).sqrt() * percent
     );
     Ok(())
-}
-
-/// Returns the bounding box of a mask: x, y, width and height.
-fn box_of(mask: &Mask) -> [f64; 4] {
-    let region = mask.bounding_region();
-    [
-        f64::from(region.u_min),
-        f64::from(region.v_min),
-        region.width() as f64,
-        region.height() as f64,
-    ]
 }

@@ -178,8 +178,7 @@ impl<'a> BopImage<'a> {
         self.image.observe(mask).map_err(|_| RowStatus::Damaged)
     }
 
-    /// Creates an observation with the mask of a detection, or with its box if it has no mask
-    /// ([`hybrid_icp::mask_in_box`]).
+    /// Creates an observation with the mask of a detection, or with its box if it has no mask.
     ///
     /// # Errors
     ///

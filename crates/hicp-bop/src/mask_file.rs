@@ -2,7 +2,6 @@
 
 use hicp_io::bop::{Detection, Rle};
 use hybrid_icp::core::Mask;
-use hybrid_icp::mask_in_box;
 
 use crate::fault::{Fault, FaultKind};
 use crate::scenes::Image;
@@ -45,7 +44,7 @@ impl<'a> Source<'a> {
                     found => Err(wrong_size(&path.display().to_string(), found, image)),
                 }
             }
-            Self::Box(bbox) => Ok(mask_in_box(&image.depth, &image.camera, bbox)),
+            Self::Box(bbox) => Ok(Mask::in_box(expected.0, expected.1, bbox)),
             // A short code may describe a huge mask, so its size is checked before decoding.
             Self::Code(code) => match (code.width(), code.height()) {
                 found if found == expected => Ok(code.to_mask()),

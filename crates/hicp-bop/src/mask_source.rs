@@ -19,7 +19,7 @@ pub enum MaskSource {
     #[default]
     Visible,
     /// The segmentations of detections, by image ([`MaskSource::detections`]). The mask of a
-    /// detection without one is in its box ([`hybrid_icp::mask_in_box`]).
+    /// detection without one is its box.
     Detections(BTreeMap<FrameKey, Vec<Detection>>),
     /// No segmentation: the mask of a row consists of all measured points in a box around its pose.
     Box(BoxMask),

@@ -140,7 +140,7 @@ def test_masks_that_do_not_fit_the_object_cause_a_warning(scene):
     swapped = hi.Observation(scene.depth, scene.mask, swapped)
     warns("if cx and cy were swapped", scene.model, swapped)
     with pytest.warns(hi.InputWarning, match=r"bbox \(200, .* not two corners"):
-        hi.mask_in_box(scene.depth, scene.camera, (200, 100, 260, 180))
+        hi.mask_in_box((200, 100, 260, 180), scene.camera)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         hi.Pipeline("local").estimate(scene.model, scene.observation)
@@ -175,8 +175,8 @@ def test_masks_that_do_not_fit_the_object_cause_a_warning(scene):
         (lambda: hi.Fuser("averag"), 'no fusion method is named "averag"'),
         (lambda: hi.PoseEstimate(np.eye(4), -np.eye(6)), "covariance has the eigenvalue"),
         (lambda: hi.fuse([]), "no estimate to fuse"),
-        (lambda: hi.mask_in_box(WALL, CAMERA, [1, 2, 3]), r"bbox .*expected four numbers"),
-        (lambda: hi.mask_in_box(WALL, CAMERA, [64, 0, 9, 9]), r"bbox is \(64, .* in a 64x48 image"),
+        (lambda: hi.mask_in_box([1, 2, 3], CAMERA), r"bbox .*expected four numbers"),
+        (lambda: hi.mask_in_box([64, 0, 9, 9], CAMERA), r"bbox is \(64, .* in a 64x48 image"),
     ],
 )
 def test_other_errors_name_the_value(make, message):

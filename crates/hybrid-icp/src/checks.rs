@@ -121,10 +121,9 @@ pub fn warnings_of_image(model: &Model, observation: &Observation, distance: f64
     };
     let center = warning_of_center(camera).filter(|warning| !is_crop(warning));
     let mut warnings = Vec::from_iter(center);
-    match warning_of_distance(distance, median_depth) {
-        None if median_depth.is_none() && pixels > 0 => warnings.push(Warning::NoDepth),
-        warning => warnings.extend(warning),
-    }
+    let no_depth = median_depth.is_none() && pixels > 0;
+    warnings.extend(no_depth.then_some(Warning::NoDepth));
+    warnings.extend(warning_of_distance(distance, median_depth));
     if !warnings.is_empty() || pixels == 0 {
         return warnings;
     }
@@ -340,7 +339,7 @@ fn warning_of_center(camera: &PinholeCamera) -> Option<Warning> {
     fault.map(|fault| Warning::Center { cx, cy, fault })
 }
 
-/// Returns whether a box has pixels of an image, as [`mask_in_box`](crate::mask_in_box) rounds it.
+/// Returns whether a box has pixels of an image, as [`Mask::in_box`](hicp_core::Mask::in_box) rounds it.
 ///
 /// The box is x and y of its corner, width and height; the size of the image is width and height,
 /// in pixels. A box of less than a pixel has none.
@@ -360,8 +359,8 @@ pub fn box_overlaps([x, y, w, h]: [f64; 4], (width, height): (u32, u32)) -> bool
 
 /// Returns [`Warning::Box`] if a box ends outside of an image, as one of two corners often does.
 ///
-/// The box is x and y of its corner, width and height, as for [`mask_in_box`](crate::mask_in_box);
-/// the size of the image is width and height, in pixels. A tenth of the box may be outside.
+/// The box is x and y of its corner, width and height, as for [`Mask::in_box`](hicp_core::Mask::in_box); the size of the
+/// image is width and height, in pixels. A tenth of the box may be outside.
 ///
 /// ```
 /// use hybrid_icp::{Warning, checks::warning_of_box};

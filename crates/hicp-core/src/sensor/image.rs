@@ -283,6 +283,35 @@ impl Mask {
         Ok(Self(raster, region))
     }
 
+    /// Creates a mask of the pixels of a bounding box: x and y of its corner, width and height.
+    ///
+    /// The box is in pixels, in the form of BOP and COCO. Its sides are rounded to pixels, and
+    /// parts outside of the image are ignored. Cost: as [`Mask::in_region`].
+    ///
+    /// # Panics
+    ///
+    /// As [`Mask::in_region`].
+    ///
+    /// ```
+    /// use hicp_core::{Mask, PixelRegion};
+    /// let mask = Mask::in_box(64, 48, [10.0, 20.2, 30.0, 99.0]);
+    /// let region = PixelRegion { u_min: 10, v_min: 20, u_max: 40, v_max: 48 };
+    /// assert_eq!((mask.bounding_region(), mask.n_set()), (region, 30 * 28));
+    /// ```
+    #[must_use]
+    pub fn in_box(width: u32, height: u32, [x, y, w, h]: [f64; 4]) -> Self {
+        // The cast saturates, and NaN becomes 0.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let pixel = |at: f64| at.round() as u32;
+        let region = PixelRegion {
+            u_min: pixel(x),
+            v_min: pixel(y),
+            u_max: pixel(x + w),
+            v_max: pixel(y + h),
+        };
+        Self::in_region(width, height, &region, |_, _| true)
+    }
+
     /// Creates a mask whose pixels outside of a region are not set.
     ///
     /// `is_set` returns whether pixel (u, v) of the region belongs to the object. Parts of the

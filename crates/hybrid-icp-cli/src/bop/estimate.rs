@@ -17,8 +17,7 @@ use crate::outputs::Files;
 ///
 /// The detections are a JSON array of the BOP benchmark, as CNOS, SAM-6D and other segmenters write
 /// them. Each has scene_id, image_id, category_id, score and a segmentation: a run-length code, as
-/// a list or compressed. A detection without a segmentation needs a bbox. The plane around the box,
-/// such as a table, is then removed.
+/// a list or compressed. A detection without a segmentation needs a bbox.
 ///
 /// The output has one row per detection, in their order, with the score of the detection.
 /// Detections without a pose are left out and counted by reason at the end. The time column has the

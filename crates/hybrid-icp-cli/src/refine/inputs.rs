@@ -12,7 +12,6 @@ use hybrid_icp::checks::{box_overlaps, warning_of_box, warning_of_diameter};
 use hybrid_icp::core::{
     ColorImage, DepthImage, Mask, Model, ModelConfig, Observation, PinholeCamera,
 };
-use hybrid_icp::mask_in_box;
 use serde::{Deserialize, Serialize};
 
 use super::colors;
@@ -162,7 +161,7 @@ pub(crate) struct RegionOptions {
     #[command(flatten)]
     pub(super) mask_options: MaskOptions,
     /// Without a mask: a box around the object, in pixels: its left and upper side, width and
-    /// height. The plane around the box, such as a table, is removed.
+    /// height. The pipelines of the paper take a table in the box for the object.
     #[arg(
         long,
         value_name = "X,Y,W,H",
@@ -322,7 +321,7 @@ impl Inputs {
         let mask = match (file_mask, &of_mask.distortion) {
             (Some(mask), Some(distortion)) => distortion.undistort_mask(&camera, &mask),
             (Some(mask), None) => mask,
-            (None, _) => mask_in_box(&depth, &camera, bbox),
+            (None, _) => Mask::in_box(depth.width(), depth.height(), bbox),
         };
         let rgb = files.rgb.as_deref();
         let info = files.read_symmetries()?;

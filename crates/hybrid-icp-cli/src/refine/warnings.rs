@@ -36,12 +36,12 @@ pub(crate) fn reason(
         return ended.to_owned();
     }
     let cause = if observation.mask().bounding_region().area() == 0 {
+        "the mask is empty"
+    } else if observation.n_measured() == 0 {
         match in_box {
             true => "no depth was measured in the box",
-            false => "the mask is empty",
+            false => "no depth was measured inside the mask",
         }
-    } else if observation.n_measured() == 0 {
-        "no depth was measured inside the mask"
     } else if observation.n_surfels() == 0 {
         "the depth measured inside the mask is too sparse for surface normals"
     } else if (init * model.center()).z + model.radius() <= 0.0 {
@@ -110,16 +110,10 @@ pub(super) fn about_facts(
     observation: &Observation,
     inputs: &Inputs,
 ) -> Vec<String> {
-    let (model, depth) = (inputs.files.model.display(), inputs.files.depth.display());
-    let mask = inputs.mask_name();
+    let (model, mask) = (inputs.files.model.display(), inputs.mask_name());
     let facts = Diagnosis::facts(object, observation).into_iter();
     let in_words = |fault: Fault| match fault {
-        Fault::MaskEmpty => Some(match inputs.region.mask {
-            Some(_) => format!("{mask}: {fault}: {}", fault.fix()),
-            None => {
-                format!("{mask}: no depth was measured in the box: check the box and {depth}")
-            }
-        }),
+        Fault::MaskEmpty => Some(format!("{mask}: {fault}: {}", fault.fix())),
         Fault::MeshInsideOut => Some(format!("{model}: {fault}: {}", fault.fix())),
         _ => None,
     };

@@ -1432,42 +1432,36 @@ def mve(model: Model, observation: Observation, T_co: npt.ArrayLike, *, occlusio
 def run_program(words: Sequence[str]) -> int:
     """Runs the program with the words of its command line, and returns the exit code."""
 
-def mask_in_box(depth: DepthImage | _Depth, camera: Camera, bbox: npt.ArrayLike, *, scale: float | None=None) -> npt.NDArray[np.bool_]:
-    """Returns the measured pixels of a box that are in front of the plane around it, such as a table.
+def mask_in_box(bbox: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.bool_]:
+    """Returns the mask of a box, for a detector without a segmentation.
 
-    It replaces the mask of a segmentation if a detector gives only a box.
+    `local`, `search`, `auto`, `color` and `estimate` give a table in the box no weight. The
+    pipelines of the paper take it for the object.
 
     Parameters
     ----------
-    depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
-        Meters, or integers with `scale`, as for `Observation`.
-    camera : Camera
-        A camera for images of this size.
     bbox : array_like, shape (4,)
         x and y of the left upper corner, width and height, pixels. A box of two corners
         (x1, y1, x2, y2) is (x1, y1, x2 - x1, y2 - y1).
-    scale : float, optional
-        Meters per unit of an image of integers, such as 0.001.
+    camera : Camera
+        The camera of the image, which has its size.
 
     Returns
     -------
     numpy.ndarray, shape (H, W), bool
-        The mask, for `Observation`. If there is no plane, all measured pixels of the box.
+        The mask, for `Observation`.
 
     Raises
     ------
     InputError
-        If a shape, dtype or unit is wrong, or the box has no pixel in the image.
+        If the box has not four numbers, or no pixel in the image.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from hybrid_icp import Camera, mask_in_box
-    >>> depth = np.full((64, 64), 0.8, np.float32)
-    >>> depth[22:42, 22:42] = 0.6  # An object in front of a wall.
     >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
-    >>> int(mask_in_box(depth, camera, (20, 20, 25, 25)).sum())
-    400
+    >>> int(mask_in_box((20, 20, 25, 30), camera).sum())
+    750
     """
 
 def render_depth(model: Model, camera: Camera, T_co: npt.ArrayLike) -> npt.NDArray[np.float32]:

@@ -43,65 +43,54 @@ fn check_size(
     )))
 }
 
-/// Returns the measured pixels of a box that are in front of the plane around it, such as a table.
+/// Returns the mask of a box, for a detector without a segmentation.
 ///
-/// It replaces the mask of a segmentation if a detector gives only a box.
+/// `local`, `search`, `auto`, `color` and `estimate` give a table in the box no weight. The
+/// pipelines of the paper take it for the object.
 ///
 /// Parameters
 /// ----------
-/// depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
-///     Meters, or integers with `scale`, as for `Observation`.
-/// camera : Camera
-///     A camera for images of this size.
 /// bbox : array_like, shape (4,)
 ///     x and y of the left upper corner, width and height, pixels. A box of two corners
 ///     (x1, y1, x2, y2) is (x1, y1, x2 - x1, y2 - y1).
-/// scale : float, optional
-///     Meters per unit of an image of integers, such as 0.001.
+/// camera : Camera
+///     The camera of the image, which has its size.
 ///
 /// Returns
 /// -------
 /// numpy.ndarray, shape (H, W), bool
-///     The mask, for `Observation`. If there is no plane, all measured pixels of the box.
+///     The mask, for `Observation`.
 ///
 /// Raises
 /// ------
 /// InputError
-///     If a shape, dtype or unit is wrong, or the box has no pixel in the image.
+///     If the box has not four numbers, or no pixel in the image.
 ///
 /// Examples
 /// --------
-/// >>> import numpy as np
 /// >>> from hybrid_icp import Camera, mask_in_box
-/// >>> depth = np.full((64, 64), 0.8, np.float32)
-/// >>> depth[22:42, 22:42] = 0.6  # An object in front of a wall.
 /// >>> camera = Camera(100, 100, 31.5, 31.5, 64, 64)
-/// >>> int(mask_in_box(depth, camera, (20, 20, 25, 25)).sum())
-/// 400
+/// >>> int(mask_in_box((20, 20, 25, 30), camera).sum())
+/// 750
 #[pyfunction]
-#[pyo3(signature = (depth, camera, bbox, *, scale = None))]
 pub(crate) fn mask_in_box(
     py: Python<'_>,
-    depth: &Bound<'_, PyAny>,
-    camera: PyCamera,
     bbox: &Bound<'_, PyAny>,
-    scale: Option<f64>,
+    camera: PyCamera,
 ) -> PyResult<Matrix<bool>> {
-    let (image, camera) = (depth::shared(depth, scale)?, camera.0);
-    check_size(&camera, depth, &image)?;
     let expected = "four numbers: x, y, width and height of a box in the image, pixels";
     let bbox = array::numbers::<f64>(bbox, &[Some(4)], "bbox", expected)?.0;
     let bbox @ [x, y, w, h] = [bbox[0], bbox[1], bbox[2], bbox[3]];
-    let (width, height) = camera.size();
+    let (width, height) = camera.0.size();
     if !hybrid_icp::checks::box_overlaps(bbox, (width, height)) {
         let found = format!("bbox is ({x}, {y}, {w}, {h}) in a {width}x{height} image");
         return Err(InputError::new_err(format!("{found}, expected {expected}")));
     }
-    if let Some(warning) = hybrid_icp::checks::warning_of_box(bbox, camera.size()) {
+    if let Some(warning) = hybrid_icp::checks::warning_of_box(bbox, (width, height)) {
         errors::warn(py, &format!("bbox ({x}, {y}, {w}, {h}): {warning}"))?;
     }
-    let mask = py.detach(|| hybrid_icp::mask_in_box(&image, &camera, bbox));
-    Ok(depth::image(mask.width(), mask.pixels()))
+    let mask = Mask::in_box(width, height, bbox);
+    Ok(depth::image(width, mask.pixels()))
 }
 
 /// A segmented depth image, for refining poses.

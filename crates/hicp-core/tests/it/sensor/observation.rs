@@ -34,6 +34,25 @@ fn ragged(width: u32, height: u32, seed: u64) -> Observation {
 }
 
 #[test]
+fn a_box_is_rounded_to_the_pixels_of_the_image() {
+    let outside = [
+        [9e9, 0.0, 9.0, 9.0],
+        [-50.0, -50.0, 20.0, 20.0],
+        [f64::NAN; 4],
+        [0.0; 4],
+    ];
+    for bbox in outside {
+        assert_eq!(Mask::in_box(64, 48, bbox).n_set(), 0, "{bbox:?}");
+    }
+    let mask = Mask::in_box(64, 48, [-1e300, -1e300, f64::INFINITY, f64::INFINITY]);
+    assert_eq!(mask, Mask::full(64, 48));
+    assert_eq!(
+        Mask::in_box(64, 48, [9.5, 9.4, 2.0, 2.0]).get(10, 9),
+        Some(true)
+    );
+}
+
+#[test]
 fn a_window_of_normals_that_is_too_small_or_too_large_is_an_error() {
     for (half_side, valid) in [(0, false), (1, true), (10, true), (11, false)] {
         let depth = DepthImage::from_meters(4, 3, vec![1.0; 12]).unwrap();

@@ -79,8 +79,12 @@ fn an_estimate_that_finds_nothing_has_no_pose() {
     }
     let dropped = DepthImage::from_meters(320, 240, vec![0.0; 320 * 240]).unwrap();
     hicp_io::write_depth_png(scene.path("depth.png"), &dropped, 0.1).unwrap();
-    let parts = ["--bbox: no depth was measured in the box: check the box and depth.png"];
-    estimate(&scene, "--bbox 60,30,200,180").warns(&parts);
+    for (region, named) in [
+        ("--mask mask.png", "mask.png"),
+        ("--bbox 60,30,200,180", "--bbox"),
+    ] {
+        estimate(&scene, region).warns(&["no depth inside the mask", &format!("and {named}")]);
+    }
     let reason = scene.json("out.json")["reason"].clone();
     let expected = "no depth was measured in the box, so that ";
     assert!(reason.as_str().unwrap().starts_with(expected), "{reason}");
