@@ -260,8 +260,8 @@ impl Cells {
         diameter: f64,
     ) -> Option<(Point3<f64>, f64)> {
         let points = || cells.iter().map(|cell| self.point(*cell, camera));
-        let side = self.side as f64 / camera.fx();
-        let area: f64 = points().map(|p| (side * p.z).powi(2)).sum();
+        let [width, height] = [camera.fx(), camera.fy()].map(|focal| self.side as f64 / focal);
+        let area: f64 = points().map(|p| width * p.z * (height * p.z)).sum();
         let sum = points().fold(Point3::origin(), |sum, p| sum + p.coords);
         let mean = sum / cells.len().max(1) as f64;
         let extent = points().map(|p| (p - mean).norm()).fold(0.0, f64::max);
@@ -347,6 +347,25 @@ mod tests {
         assert_eq!(find(0.04, 0.06, 0.03, None).found.len(), 1);
         let left = Mask::in_region(160, 120, &camera.region(), |u, _| u < 72);
         assert_eq!(find(0.04, 1.0, 0.03, Some(&left)).found.len(), 1);
+    }
+
+    #[test]
+    fn areas_do_not_depend_on_the_shape_of_a_pixel() {
+        let camera = PinholeCamera::new(200.0, 100.0, 79.5, 29.5, 160, 60).unwrap();
+        // A square of 8 cm at 0.5 m, in front of a wall.
+        let depth = (0..160 * 60).map(|i| match (i % 160, i / 160) {
+            (60..92, 20..36) => 0.5,
+            _ => 0.9,
+        });
+        let depth = DepthImage::from_meters(160, 60, depth.collect()).unwrap();
+        let sphere = Sphere {
+            center: Point3::new(0.0, 0.0, 0.5),
+            radius: 1.0,
+        };
+        let segments = Segments::new(&depth, &camera, &sphere, (0.12, 0.03), None);
+        assert_eq!(segments.found.len(), 1);
+        let area = segments.found[0].area;
+        assert!((area / 0.0064 - 1.0).abs() < 0.05, "{area}");
     }
 
     #[test]
