@@ -155,7 +155,7 @@ impl Matcher {
         let ambiguous = rivals
             .get(1)
             .is_some_and(|other| odds(&rivals[0]) - odds(other) < CLEAR_ODDS);
-        let covariance = self.covariance(&observation, &rivals[0]);
+        let covariance = self.covariance(&observation, &rivals[0], f64::INFINITY);
         Ok(((rivals[0], covariance), ambiguous))
     }
 

@@ -34,6 +34,8 @@ const ROUGH_DIAMETERS: f64 = 0.05;
 const START_NOISE: f64 = 0.02;
 /// Rise of the score up to which an image does not contradict a move.
 const SAME_SCORE: f64 = 0.03;
+/// Factor on the deviation of an unknown direction with which it is not information.
+const NOTHING: f64 = 1e3;
 /// Distance from the prediction, beyond four standard deviations, that is a jump, in radii.
 const JUMP_RADII: f64 = 0.35;
 
@@ -117,7 +119,7 @@ impl Matcher {
             let before = self.noise.unwrap_or(measured);
             self.noise = Some(before + 0.2 * (measured - before));
         }
-        Ok(best.map(|found| (found, self.covariance(&observation, &found))))
+        Ok(best.map(|found| (found, self.covariance(&observation, &found, deviation))))
     }
 
     /// Returns the better of two registrations from a pose.
@@ -213,8 +215,15 @@ impl Matcher {
     ///
     /// A direction of little information is unknown if the image does not contradict a move by a
     /// tenth of the diameter in it, because facets of a mesh and noise have some in each one.
-    /// An example is the rotation of a mug whose handle is hidden.
-    pub(super) fn covariance(&mut self, observation: &Observation, found: &Found) -> Matrix6<f64> {
+    /// An example is the rotation of a mug whose handle is hidden. Its large variance bounds
+    /// predictions that deviate by more, in meters. It must not make others more certain, image by
+    /// image.
+    pub(super) fn covariance(
+        &mut self,
+        observation: &Observation,
+        found: &Found,
+        deviation: f64,
+    ) -> Matrix6<f64> {
         let radius = self.extent.radius;
         let center = found.pose * self.model.center();
         let (scale, information) = match found.quality {
@@ -228,8 +237,9 @@ impl Matcher {
         let mut registered = Registered::new(&information, &center, &displacement);
         let weak = (0..6).filter_map(|direction| Some((direction, registered.weak(direction)?)));
         let weak: Vec<_> = weak.collect();
+        let meters = DIFFERENT_DIAMETERS * self.extent.diameter;
+        let mut unknown = [radius, 1.0];
         if !weak.is_empty() {
-            let meters = DIFFERENT_DIAMETERS * self.extent.diameter;
             let problem = Problem::new(&self.model, observation);
             let mut context = self.workspace.context(&problem);
             let center = self.model.center();
@@ -240,10 +250,13 @@ impl Matcher {
                 };
                 if is_good(meters) || is_good(-meters) {
                     registered.forget(direction);
+                    if deviation < meters {
+                        unknown = [radius, 1.0].map(|x| NOTHING * x);
+                    }
                 }
             }
         }
-        registered.covariance(scale.max(1e-8), [0.005 * radius, 0.005], [radius, 1.0])
+        registered.covariance(scale.max(1e-8), [0.005 * radius, 0.005], unknown)
     }
 }
 

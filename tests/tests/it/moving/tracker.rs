@@ -166,6 +166,29 @@ fn a_mug_that_turns_with_its_handle_behind_is_doubtful() {
     assert_eq!(states[20], TrackState::Doubtful);
 }
 
+/// Images that do not show the handle must not add up to a known rotation.
+#[test]
+fn a_slow_mug_that_hides_its_handle_stays_doubtful() {
+    let model = Household::Mug.model().unwrap();
+    let upright =
+        UnitQuaternion::from_basis_unchecked(&[Vector3::z(), -Vector3::x(), -Vector3::y()]);
+    let truth = Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.6), upright);
+    let config = TrackerConfig {
+        meters_per_second: 0.02,
+        degrees_per_second: 1.0,
+        ..TrackerConfig::default()
+    };
+    let mut tracker = Tracker::new(model.clone(), camera(), config);
+    tracker.start(&(truth * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.4)));
+    let depth = Arc::new(hicp_tests::render(&model, &camera(), &truth).0);
+    for frame in 0..300 {
+        let tracked = tracker.step(Arc::clone(&depth), SECONDS, None).unwrap();
+        let deviation = tracked.deviation_meters / model.diameter();
+        let place = format!("{frame}: {deviation} d");
+        assert_eq!(tracked.state, TrackState::Doubtful, "{place}");
+    }
+}
+
 #[test]
 fn an_object_that_shows_a_flat_side_is_followed() {
     let corners = [
