@@ -30,7 +30,7 @@ const SEARCHED_RADII: f64 = 0.3;
 const SURE_DIAMETERS: f64 = 0.05;
 /// Time for which a pose that was searched has to be tracked before it counts as right, seconds.
 const TRIAL_SECONDS: f64 = 1.0;
-/// Largest deviation of a prediction near which an object is registered without a search.
+/// Largest deviation of a prediction near which a registration need not be sure, in diameters.
 const NEAR_DIAMETERS: f64 = 0.4;
 
 /// Follows a moving object from depth image to depth image, without masks.
@@ -168,8 +168,11 @@ impl Tracker {
         }
         let diameter = self.matcher.extent.diameter;
         let (lost, mut found) = (self.state == TrackState::Lost, None);
-        if self.matcher.extent.deviation(&motion) < NEAR_DIAMETERS * diameter {
+        let near = self.matcher.extent.deviation(&motion) < NEAR_DIAMETERS * diameter;
+        if near || !lost {
             found = self.matcher.follow(depth, mask, &motion)?;
+            // Far away, another surface may look like the object.
+            found = found.filter(|(found, _)| near || found.is_sure());
         }
         let counts = |f: &Found| if lost { f.stands_alone() } else { f.explains() };
         let measured = found.filter(|(found, _)| counts(found));

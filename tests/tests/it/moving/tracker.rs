@@ -268,10 +268,11 @@ impl Standing {
         (depth, camera): (&Arc<DepthImage>, PinholeCamera),
         truth: &Isometry3<f64>,
         start: &Isometry3<f64>,
+        seconds: f64,
     ) {
         let mut tracker = Tracker::new(Arc::clone(model), camera, TrackerConfig::default());
         tracker.start(start);
-        let steps = (0..6).map(|_| tracker.step(Arc::clone(depth), SECONDS, None).unwrap());
+        let steps = (0..6).map(|_| tracker.step(Arc::clone(depth), seconds, None).unwrap());
         let last = steps.last().unwrap();
         let off = ModelPoints::new(model).mssd(&last.camera_from_object, truth);
         let tracking = last.state == TrackState::Tracking;
@@ -287,21 +288,25 @@ impl Standing {
 #[test]
 fn an_object_among_others_on_a_table_is_followed() {
     let tabletop = Tabletop::new(&Household::TUNING).unwrap();
-    let mut standing = Standing::default();
-    for (seed, distorted) in [(0, false), (4, false), (5, true), (12, true)] {
-        let scene = match distorted {
-            true => tabletop.distorted_scene(seed).unwrap(),
-            false => tabletop.scene(seed).unwrap(),
-        };
-        for (index, seen) in (0..).zip(scene) {
-            let model = Arc::new(tabletop.objects[seen.model].1.clone());
-            let start = seen.near(&mut stream(seed, &["standing"], index), 1.0);
-            standing.track(&model, (&seen.depth, seen.camera), &seen.truth, &start);
+    // At two images per second, the object might be anywhere near, and only sure poses count.
+    for (seconds, most_lost) in [(SECONDS, 1), (0.5, 4)] {
+        let mut standing = Standing::default();
+        for (seed, distorted) in [(0, false), (4, false), (5, true), (12, true)] {
+            let scene = match distorted {
+                true => tabletop.distorted_scene(seed).unwrap(),
+                false => tabletop.scene(seed).unwrap(),
+            };
+            for (index, seen) in (0..).zip(scene) {
+                let model = Arc::new(tabletop.objects[seen.model].1.clone());
+                let start = seen.near(&mut stream(seed, &["standing"], index), 1.0);
+                let image = (&seen.depth, seen.camera);
+                standing.track(&model, image, &seen.truth, &start, seconds);
+            }
         }
+        let [tracked, doubtful, lost] = standing.states;
+        assert!(lost <= most_lost && tracked > 2 * doubtful, "{standing:?}");
+        assert_eq!(standing.wrong, 0, "{standing:?}");
     }
-    let [tracked, doubtful, lost] = standing.states;
-    assert!(lost <= 1 && tracked > 2 * doubtful, "{standing:?}");
-    assert_eq!(standing.wrong, 0, "{standing:?}");
 }
 
 /// The edges of real sensors are not measured, or off by pixels, and a table and other objects are
@@ -316,7 +321,7 @@ fn an_object_in_a_real_image_is_followed() {
     for instance in ycbv::instances(&Dataset::open(root).unwrap()) {
         let (truth, observation) = (&instance.truth, instance.observe());
         let image = (observation.shared_depth(), *observation.camera());
-        standing.track(&instance.model, image, truth, truth);
+        standing.track(&instance.model, image, truth, truth, SECONDS);
     }
     let [tracked, _, lost] = standing.states;
     assert!(tracked >= 8 && lost <= 2, "{standing:?}");
