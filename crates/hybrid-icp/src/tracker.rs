@@ -28,7 +28,7 @@ const START_RADII: f64 = 0.2;
 const SEARCHED_RADII: f64 = 0.3;
 /// Largest deviation of a pose with the state [`TrackState::Tracking`], in diameters.
 const SURE_DIAMETERS: f64 = 0.05;
-/// Time for which a pose that was searched has to be tracked before it counts as right, seconds.
+/// Time for which a pose that was searched has to be seen before it counts as right, seconds.
 const TRIAL_SECONDS: f64 = 1.0;
 /// Largest deviation of a prediction near which a registration need not be sure, in diameters.
 const NEAR_DIAMETERS: f64 = 0.4;
@@ -218,7 +218,7 @@ impl Tracker {
                 self.trial = Some(Trial {
                     without: around,
                     confirmed,
-                    tracked: 0.0,
+                    seen: 0.0,
                 });
             }
         }
@@ -236,15 +236,15 @@ impl Tracker {
             None => TrackState::Lost,
         };
         match (self.state, &mut self.trial) {
-            (TrackState::Tracking, Some(trial)) => {
-                trial.tracked += seconds;
-                if trial.tracked > TRIAL_SECONDS {
-                    self.trial = None;
-                }
-            }
             (TrackState::Lost, Some(trial)) => {
                 motion = trial.without;
                 self.trial = None;
+            }
+            (_, Some(trial)) if confirmed && seen.is_some() => {
+                trial.seen += seconds;
+                if trial.seen > TRIAL_SECONDS {
+                    self.trial = None;
+                }
             }
             _ => {}
         }
@@ -285,8 +285,8 @@ struct Trial {
     without: Motion,
     /// `true` if the pose is nearly certain, or another image showed the object there.
     confirmed: bool,
-    /// Time for which the state has been [`TrackState::Tracking`] since, seconds.
-    tracked: f64,
+    /// Time for which images have shown the object there since it was confirmed, seconds.
+    seen: f64,
 }
 
 impl std::fmt::Debug for Tracker {

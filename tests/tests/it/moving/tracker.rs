@@ -189,6 +189,34 @@ fn a_slow_mug_that_hides_its_handle_stays_doubtful() {
     }
 }
 
+/// The guess for a lost object starts from the pose that was followed last.
+#[test]
+fn an_object_that_was_found_and_followed_is_not_guessed_where_it_was_lost_before() {
+    let model = Household::Mug.model().unwrap();
+    let upright =
+        UnitQuaternion::from_basis_unchecked(&[Vector3::z(), -Vector3::x(), -Vector3::y()]);
+    let pose = |x| Isometry3::from_parts(Translation3::new(x, 0.0, 0.7), upright);
+    let nothing = Arc::new(DepthImage::from_meters(320, 240, vec![0.0; 320 * 240]).unwrap());
+    let mut tracker = Tracker::new(model.clone(), camera(), TrackerConfig::default());
+    tracker.start(&pose(-0.15));
+    for frame in 0..90 {
+        // The handle is hidden, so the mug stays doubtful after it was found.
+        let x = -0.15 + 0.004 * f64::from((frame - 15).clamp(0, 70));
+        let depth = match frame {
+            3..15 | 85.. => Arc::clone(&nothing),
+            _ => Arc::new(hicp_tests::render(&model, &camera(), &pose(x)).0),
+        };
+        let tracked = tracker.step(depth, SECONDS, None).unwrap();
+        let expected = match frame {
+            6..15 | 88.. => TrackState::Lost,
+            _ => TrackState::Doubtful,
+        };
+        assert_eq!(tracked.state, expected, "{frame}");
+        let away = tracked.camera_from_object.translation.x - x;
+        assert!(away.abs() < 0.03, "{frame}: {away}");
+    }
+}
+
 #[test]
 fn an_object_that_shows_a_flat_side_is_followed() {
     let corners = [
