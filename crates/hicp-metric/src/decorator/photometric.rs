@@ -26,7 +26,8 @@ const STIFFNESS: f64 = 1e-3;
 /// normal n. The gain α, the offset β and the shading γ are those of the least squares fit, so
 /// exposure, white balance and a lamp do not matter. If the colors contradict the model, α is 0
 /// and nothing is pulled. The rows of the system are −α ∇a · ∂(u, v)/∂p. At the minimum over α, β
-/// and γ, they give the exact gradient.
+/// and γ, they give the exact gradient. The covariance of the system is for the variance of the
+/// pairs alone.
 ///
 /// Source: the direct form of Park, Zhou & Koltun, "Colored Point Cloud Registration Revisited",
 /// 2017, combined with the light as in a correlation. Their form on point clouds takes the gradient
@@ -229,6 +230,8 @@ impl<'a> Term<'a> {
 
     /// Adds the rows to a system of pairs whose weights sum up to `weight`.
     fn add_to(&self, system: &mut NormalEquations, weight: f64) {
+        // The weights of these rows say nothing about the noise of the pairs.
+        system.variance = system.row_variance();
         let camera = self.colors.observation.camera();
         self.colors.visit(|sample, smooth| {
             let (point, light) = (&sample.point, light(sample));

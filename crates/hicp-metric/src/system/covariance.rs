@@ -62,12 +62,7 @@ impl NormalEquations {
     /// hicp-tests --example nees_report 300` reproduces these figures.
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
-        let variance = self.variance.or_else(|| {
-            let spare = self.rows.checked_sub(self.n_free());
-            #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
-            let spare = spare.filter(|spare| *spare > 0)? as f64;
-            Some(self.loss() / spare)
-        })?;
+        let variance = self.row_variance()?;
         let (mut reduced, _) = self.reduced(&self.scaled_hessian());
         self.fill_held(&mut reduced);
         let eigenvalues = eigen(reduced)?.eigenvalues;
@@ -80,6 +75,16 @@ impl NormalEquations {
         let covariance =
             carried * inverse_of(&cholesky6(&reduced)?) * carried.transpose() * variance;
         finite(&covariance)
+    }
+
+    /// Returns the variance of a row of weight 1: the known one, or that of the rows.
+    pub(crate) fn row_variance(&self) -> Option<f64> {
+        self.variance.or_else(|| {
+            let spare = self.rows.checked_sub(self.n_free());
+            #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
+            let spare = spare.filter(|spare| *spare > 0)? as f64;
+            Some(self.loss() / spare)
+        })
     }
 }
 

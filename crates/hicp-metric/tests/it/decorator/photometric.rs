@@ -105,6 +105,27 @@ fn the_gradient_is_that_of_the_loss() {
 }
 
 #[test]
+fn the_variance_is_that_of_the_pairs() {
+    let (model, observation) = (board(), wall(|color| color));
+    let pose = truth() * Isometry3::translation(0.002, 0.001, 0.0);
+    let iteration = Iteration::new(0, &pose, Problem::new(&model, &observation));
+    let (pairs, mut metric) = (pairs(&pose), Photometric::new(PointToPlane));
+    let plain = PointToPlane.system(&iteration, &pairs).unwrap();
+    let plain = plain.covariance().unwrap();
+    // With hardly any weight, the colors change nothing.
+    metric.weight_diameters = 1e-9;
+    let with = metric.system(&iteration, &pairs).unwrap();
+    assert!(with.rows() > 1000);
+    let change = (with.covariance().unwrap() - plain).amax() / plain.amax();
+    assert!(change < 1e-6, "{change}");
+    // With more, they reduce every variance.
+    metric.weight_diameters = 0.01;
+    let with = metric.system(&iteration, &pairs).unwrap();
+    let (with, before) = (with.covariance().unwrap().diagonal(), plain.diagonal());
+    assert!(with.iter().zip(&before).all(|(with, before)| with < before));
+}
+
+#[test]
 fn the_loss_is_smallest_at_the_truth_and_bounded() {
     let (model, observation) = (board(), wall(|color| color));
     let problem = Problem::new(&model, &observation);
