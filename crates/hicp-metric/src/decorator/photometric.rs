@@ -249,6 +249,21 @@ impl<'a> Term<'a> {
     }
 }
 
+impl<M: Minimize> Photometric<M> {
+    /// Returns the system and the mean loss of the metric with a term, which is fitted only once.
+    fn with(
+        &mut self,
+        term: &Term<'_>,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<(NormalEquations, f64)> {
+        let mut system = self.metric.system(iteration, pairs)?;
+        term.add_to(&mut system, total_weight(pairs));
+        let mean_loss = self.metric.mean_loss(iteration, pairs)? + term.loss;
+        Some((system, mean_loss))
+    }
+}
+
 impl<M: Minimize> Minimize for Photometric<M> {
     fn inner(&mut self, _: &Iteration<'_>) -> Option<&mut dyn Minimize> {
         Some(&mut self.metric)
@@ -271,13 +286,25 @@ impl<M: Minimize> Minimize for Photometric<M> {
         Some(system)
     }
 
+    fn system_and_loss(
+        &mut self,
+        iteration: &Iteration<'_>,
+        pairs: &Correspondences,
+    ) -> Option<(NormalEquations, f64)> {
+        match self.term(iteration, pairs) {
+            Some(term) => self.with(&term, iteration, pairs),
+            None => Some((
+                self.metric.system(iteration, pairs)?,
+                self.metric.mean_loss(iteration, pairs)?,
+            )),
+        }
+    }
+
     fn minimize(&mut self, iteration: &Iteration<'_>, pairs: &Correspondences) -> Option<Step> {
         let Some(term) = self.term(iteration, pairs) else {
             return self.metric.minimize(iteration, pairs);
         };
-        let mean_loss = self.metric.mean_loss(iteration, pairs)? + term.loss;
-        let mut system = self.metric.system(iteration, pairs)?;
-        term.add_to(&mut system, total_weight(pairs));
+        let (system, mean_loss) = self.with(&term, iteration, pairs)?;
         Some(Step {
             increment: system.solve()?,
             mean_loss,
