@@ -42,11 +42,13 @@ pub fn register_depth(
         );
         let (u, v, z) = (u as f64, v as f64, f64::from(*z));
         let (_, depth) = project(u, v, z);
-        let (a, _) = project(u - 0.5, v - 0.5, z);
-        let (b, _) = project(u + 0.5, v + 0.5, z);
+        let corners = [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)];
+        let corners = corners.map(|(du, dv)| project(u + du, v + dv, z).0);
         // A square smaller than a pixel still covers the pixel that its center is in.
         let span = |axis: usize, side: u32| {
-            let (low, high) = (a[axis].min(b[axis]), a[axis].max(b[axis]));
+            let places = corners.map(|corner| corner[axis]);
+            let low = places.into_iter().fold(f64::INFINITY, f64::min);
+            let high = places.into_iter().fold(f64::NEG_INFINITY, f64::max);
             let middle = ((low + high) / 2.0).round();
             let small = high - low <= MOST_PIXELS;
             let (first, last) = (

@@ -374,6 +374,13 @@ fn registered_depth_is_that_of_the_other_camera() {
     assert!((80..96).all(|v| (10..100).all(|u| v > 90 || seen.get(u, v) == Some(1.1))));
     // Behind the right edge of the square, the depth camera saw nothing.
     assert_eq!(at(0.065, 0.0, 0.75), 0.0);
+    // Nor does it if the cameras are rolled against each other.
+    let flat = DepthImage::collect(64, 48, vec![1.0; 64 * 48]).unwrap();
+    for degrees in [3.0_f64, 30.0, 45.0] {
+        let rolled = Isometry3::rotation(Vector3::z() * degrees.to_radians());
+        let seen = register_depth(&flat, &from, &to, &rolled);
+        assert!((40..56).all(|v| (50..80).all(|u| seen.get(u, v) == Some(1.0))));
+    }
     let behind = register_depth(&depth, &from, &to, &Isometry3::translation(0.0, 0.0, -2.0));
     assert!(behind.pixels().iter().all(|z| *z == 0.0));
     let moved = Isometry3::translation(0.0, 0.0, -0.999_999);
