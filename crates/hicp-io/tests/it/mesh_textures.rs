@@ -199,6 +199,15 @@ fn gltf_textures_come_from_files_and_buffers_and_have_a_factor() {
         (red - 120.0).abs() < 3.0 && green == 250.0 && blue == 0.0,
         "{red}"
     );
+    // A transform of the texture names other coordinates, and turns them around the corner.
+    let transform = r#"{"index": 0, "texCoord": 7, "extensions": {"KHR_texture_transform":
+        {"texCoord": 0, "offset": [0, 1], "rotation": 1.5707963267948966}}}"#;
+    let text = gltf(r#"{"bufferView": 3}"#, "[1, 1, 1, 1]", bin.len());
+    let file = read(&folder.write("a.gltf", text.replace(r#"{"index": 0}"#, transform)));
+    let places = [(0.25, 0.75), (0.75, 0.75), (0.25, 0.25), (0.75, 0.25)];
+    for ((x, y), expected) in places.into_iter().zip([BLUE, RED, WHITE, GREEN]) {
+        assert_eq!(color_at(&file.mesh, x, y), expected.map(f32::from));
+    }
     // Without a texture, the base color is that of the vertices.
     let text = gltf("", "[0.2, 1, 0, 1]", bin.len());
     let text = text.replace(r#""baseColorTexture": {"index": 0},"#, "");

@@ -72,11 +72,13 @@ struct UseExtensions {
 
 /// A transform of texture coordinates: scaled, rotated, and moved by the offset.
 #[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default)]
+#[serde(rename_all = "camelCase", default)]
 struct Transform {
     offset: Option<Numbers<2>>,
     rotation: f64,
     scale: Option<Numbers<2>>,
+    /// Replaces [`TextureUse::tex_coord`].
+    tex_coord: Option<usize>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -199,7 +201,9 @@ impl Paint {
             let place = Place::Field("$.meshes".to_owned());
             Err(accessors.reading.refuse(place, found, expected))
         };
-        let name = format!("TEXCOORD_{}", texture.tex_coord);
+        let transform = &texture.extensions.transform;
+        let set = transform.tex_coord.unwrap_or(texture.tex_coord);
+        let name = format!("TEXCOORD_{set}");
         let Some(index) = primitive.attributes.get(&name) else {
             return refuse(format!("a texture without {name}"), "both".to_owned());
         };
@@ -208,7 +212,6 @@ impl Paint {
             let found = format!("{} texture coordinates", numbers.len() / 2);
             return refuse(found, format!("{count}, one for each vertex"));
         }
-        let transform = &texture.extensions.transform;
         let Numbers([x, y]) = transform.offset.unwrap_or(Numbers([0.0; 2]));
         let Numbers([sx, sy]) = transform.scale.unwrap_or(Numbers([1.0; 2]));
         let (sin, cos) = transform.rotation.sin_cos();
