@@ -135,6 +135,21 @@ fn one_color_overexposure_and_missing_colors_are_no_evidence() {
 }
 
 #[test]
+fn an_image_of_one_color_agrees_with_nothing() {
+    let (painted, seen) = scene(Household::Pot, Texture::Logos);
+    let model = &painted.scenes.objects[seen.model].1;
+    let (width, height) = seen.camera.size();
+    let gray = ColorImage::new(width, height, vec![[100; 3]; (width * height) as usize]).unwrap();
+    let observation = seen.observe(MaskKind::Exact).unwrap();
+    let observation = observation.with_color(gray).unwrap();
+    let found = measure(model, &observation, &seen.truth);
+    assert!(found.is_telling() && found.correlation == 0.0, "{found:?}");
+    let problem = Problem::new(model, &observation);
+    let sampled = SampledColor::default().measure(&problem, &seen.truth);
+    assert_eq!(sampled.correlation, 0.0);
+}
+
+#[test]
 fn a_lamp_and_its_shadow_matter_least_if_the_surroundings_are_removed() {
     let model = board(colorful);
     let observation = photograph(&model, |color| color);

@@ -11,6 +11,8 @@ const LEAST_FILLED: f32 = 0.25;
 const AROUND: usize = 2;
 /// Smallest number of cells that are evidence.
 const LEAST_CELLS: usize = 12;
+/// Smallest variance of a channel of the image that is not a rounding error, gray levels squared.
+const LEAST_VARIANCE: f64 = 1e-6;
 /// Smallest contrast of the model's colors that is evidence, gray levels.
 pub(crate) const LEAST_CONTRAST: f64 = 6.0;
 
@@ -151,7 +153,8 @@ impl Cells {
         let mut correlation = 0.0;
         for [model, image, both] in squares {
             let norm = (model * image).sqrt();
-            if norm > 0.0 {
+            // An image of one color agrees with nothing.
+            if norm > 0.0 && image > LEAST_VARIANCE * sum {
                 correlation += model * (both / norm);
             }
         }
