@@ -20,7 +20,8 @@ pub const OCCLUDER_GAP_METERS: f64 = 0.05;
 ///
 /// Each step has its own stream of random numbers, which depends on the case and not on the
 /// parameters of the step. Different levels of one step are therefore paired, and no step changes
-/// another.
+/// the stream of another. A wall or a board still changes the noise of single pixels, because the
+/// sensor draws one number per measured pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Corruption {
     /// Distance of a wall across the optical axis behind the farthest visible point of the object,

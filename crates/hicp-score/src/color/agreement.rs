@@ -6,8 +6,9 @@ use hicp_core::{Context, Isometry3, Problem};
 use crate::color::cells::{Cells, ColorEvidence, Shading};
 use crate::score::Score;
 
-/// Largest number of compared pixels, about.
-const MOST_PIXELS: usize = 2000;
+/// Number of compared pixels in the box of the render, about. The step is an integer, so there may
+/// be three times as many.
+const PIXELS: usize = 2000;
 
 /// Scores how well the colors of a model agree with the color image: 0 perfectly, 0.5 not at all.
 ///
@@ -20,8 +21,8 @@ const MOST_PIXELS: usize = 2000;
 /// An object of one color, an overexposed image, and a problem without colors are no evidence, and
 /// score 0.5 at every pose: see [`ColorAgreement::measure`].
 ///
-/// Cost: one render (shared with other components that use this pose), and at most some 2000 pixels
-/// of it, about 100 ns each.
+/// Cost: one render (shared with other components that use this pose), and some 2000 to 6000
+/// pixels of the box around it, about 100 ns each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColorAgreement {
     /// The effects of light to remove.
@@ -52,7 +53,7 @@ impl ColorAgreement {
         let (mesh, camera) = (model.mesh(), observation.camera());
         let region = view.region();
         // A grid that starts at the corner of the image shows equal pixels at near poses.
-        let step = index(region.area().div_ceil(MOST_PIXELS).isqrt().max(1));
+        let step = index(region.area().div_ceil(PIXELS).isqrt().max(1));
         let rows = region.v_min.next_multiple_of(step)..region.v_max;
         let columns = region.u_min.next_multiple_of(step)..region.u_max;
         for v in rows.step_by(step as usize) {
