@@ -293,10 +293,7 @@ impl<M: Minimize> Minimize for Photometric<M> {
     ) -> Option<(NormalEquations, f64)> {
         match self.term(iteration, pairs) {
             Some(term) => self.with(&term, iteration, pairs),
-            None => Some((
-                self.metric.system(iteration, pairs)?,
-                self.metric.mean_loss(iteration, pairs)?,
-            )),
+            None => self.metric.system_and_loss(iteration, pairs),
         }
     }
 

@@ -210,6 +210,14 @@ fn without_evidence_it_is_the_inner_metric_bit_for_bit() {
             metric.system(&iteration, &pairs),
             PointToPoint.system(&iteration, &pairs)
         );
+        // Inside of another decorator, too.
+        for seed in 0..20 {
+            let pairs = at(&pose, &messy(&mut Numbers(seed), 60));
+            assert_eq!(
+                Photometric::new(PointToPlane).system_and_loss(&iteration, &pairs),
+                PointToPlane.system_and_loss(&iteration, &pairs)
+            );
+        }
     }
     // No weight is none, too.
     let iteration = Iteration::new(0, &truth(), Problem::new(&model, &seen));
