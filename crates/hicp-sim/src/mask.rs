@@ -134,10 +134,11 @@ pub(crate) fn map_depth(
 /// Averages a mask over square cells, interpolates between their centers, and thresholds.
 fn soften(mask: &Mask, cells: u32, threshold: f64) -> Result<Mask, SimError> {
     let region = mask.bounding_region();
-    let side = region.width().max(region.height()) as f64 / f64::from(cells);
-    if side <= 0.0 {
+    let longest = hicp_core::internal::index(region.width().max(region.height()));
+    if longest == 0 {
         return Ok(mask.clone());
     }
+    let side = f64::from(longest) / f64::from(cells);
     // A border of empty cells lets the interpolation fall to zero outside of the box.
     let count = cells as usize + 2;
     let mut sums = vec![(0.0, 0.0); count * count];
@@ -145,7 +146,13 @@ fn soften(mask: &Mask, cells: u32, threshold: f64) -> Result<Mask, SimError> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     // At least 0, and clamped to the cells.
     let index = |x: f64| (x as usize).min(count - 1);
-    for (u, v) in region.pixels() {
+    // The cells at the end of the shorter side reach beyond the box.
+    let square = PixelRegion {
+        u_max: region.u_min + longest,
+        v_max: region.v_min + longest,
+        ..region
+    };
+    for (u, v) in square.pixels() {
         let at = index(cell(v, region.v_min)) * count + index(cell(u, region.u_min));
         sums[at].0 += f64::from(u8::from(mask.get(u, v) == Some(true)));
         sums[at].1 += 1.0;
@@ -301,6 +308,32 @@ mod tests {
         assert!(changed > 0 && changed < count(&full) / 10, "{changed}");
         let reach = large.bounding_region();
         assert!(reach.width() <= 61 + 2 * 5 && reach.width() > 61);
+
+        // All sides of a bar move alike, whether or not its width is a multiple of the cells.
+        for width in [30, 37, 44] {
+            let region = PixelRegion {
+                u_min: 20,
+                v_min: 9,
+                u_max: 20 + width,
+                v_max: 69,
+            };
+            let bar = Mask::in_region(100, 80, &region, |_, _| true);
+            for (soft_threshold, most) in [(0.5, 2), (0.0, 5)] {
+                let defects = MaskDefects {
+                    soft_cells: 14,
+                    soft_threshold,
+                    ..MaskDefects::default()
+                };
+                let soft = defects.apply(&mut rng(4), &bar).unwrap().bounding_region();
+                let moved = [
+                    region.u_min.abs_diff(soft.u_min),
+                    region.v_min.abs_diff(soft.v_min),
+                    region.u_max.abs_diff(soft.u_max),
+                    region.v_max.abs_diff(soft.v_max),
+                ];
+                assert!(moved.iter().all(|by| *by <= most), "{width}: {moved:?}");
+            }
+        }
 
         let boxed = MaskDefects {
             boxed: true,
