@@ -373,7 +373,8 @@ pub fn align_in<'a>(
     // With few pairs, normals are not to blame.
     let degenerate = outcome.termination == Termination::Degenerate && outcome.n_pairs() == 0;
     let few = |(_, cloud): &(_, &Cloud)| cloud.surfels().len() < 6;
-    let by_pairs = other_unit.is_some() || clouds.iter().any(few);
+    let few_pairs = session.workspace.pairs().len() < 6 || clouds.iter().any(few);
+    let by_pairs = other_unit.is_some() || few_pairs;
     let bare = clouds
         .iter()
         .rfind(|(_, cloud)| cloud.normals_from() == Some(0));

@@ -529,6 +529,24 @@ fn absent_normals_of_the_source_are_never_used() {
     }
 }
 
+/// Sources without normals are not at fault if the clouds touch in too few points.
+#[test]
+fn few_pairs_are_not_absent_normals() {
+    let row = |i: u16| Point3::new(0.01 * f32::from(i), 0.1 * f32::from(i % 7), 0.5);
+    let near: Vec<_> = (0..50).map(row).collect();
+    let touching: Vec<_> = (49..90).map(row).collect();
+    for kind in [Registration::PointToPoint, Registration::PointToPlane] {
+        let options = CloudOptions::default();
+        let source = options.for_source_of(kind).cloud(&near, None).unwrap();
+        let target = options.target_of(kind, &touching, None).unwrap();
+        let init = Isometry3::identity();
+        let found = align(&source, &target, &init, &mut *kind.build(Some(0.005)));
+        assert_eq!(found.outcome.termination, Termination::Degenerate);
+        let little = CloudWarning::LittleOverlap { fitness: 0.0 };
+        assert_eq!(found.warnings.last(), Some(&little), "{kind:?}");
+    }
+}
+
 /// A scan of four walls in one plane, as of a laser scanner, determines no normals.
 #[test]
 fn point_to_point_keeps_target_points_without_a_normal() {
