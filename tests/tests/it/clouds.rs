@@ -6,7 +6,7 @@ use hybrid_icp::association::{
     VisibleSurface, VoxelGrid, estimate_normals, voxel_downsample,
 };
 use hybrid_icp::core::{
-    Cloud, Isometry3, Model, Point3, Problem, Surfel, Vector3, sample_surface, se3,
+    Cloud, Isometry3, Model, Point3, Problem, Surfel, UnitVector3, Vector3, sample_surface, se3,
 };
 use hybrid_icp::icp::{
     Guard, Icp, IterationLimit, Session, SmallMotion, Stage, Termination, Workspace,
@@ -487,9 +487,25 @@ fn voxels_hold_the_mean_of_their_points() {
     }
     assert_eq!(voxel_downsample(&[], None, 1.0).0, []);
     let up = Vector3::z_axis();
-    let normals = [up, up, up, -up];
-    let (_, normals) = voxel_downsample(&points, Some(&normals), 1.0);
-    assert_eq!(normals.unwrap(), [up, up]);
+    let unknown = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
+    let normals = |given: [_; 4]| voxel_downsample(&points, Some(&given), 1.0).1.unwrap();
+    // A point without a normal leaves its cell those of the others.
+    assert_eq!(normals([up, up, up, -up]), [up, up]);
+    assert_eq!(normals([unknown, up, up, -up]), [up, up]);
+    let options = CloudOptions {
+        voxel_meters: Some(1.0),
+        neighbors: 3,
+    };
+    for [a, b] in [[unknown, unknown], [up, -up]] {
+        let given = [a, b, up, up];
+        assert!(normals(given)[0].x.is_nan());
+        let raised = points.map(|point| point + up.into_inner());
+        let target = |kind| options.target_of(kind, &raised, Some(&given)).unwrap();
+        let counts = |cloud: Cloud| (cloud.surfels().len(), cloud.n_skipped());
+        // One point has no place, and one of the two cells no normal.
+        assert_eq!(counts(target(Registration::PointToPoint)), (2, 1));
+        assert_eq!(counts(target(Registration::PointToPlane)), (1, 2));
+    }
     let surfel = |point| Surfel { point, normal: up };
     let given = Cloud::new(points.map(surfel));
     assert_eq!((given.n_skipped(), given.normals_from()), (1, None));

@@ -9,9 +9,10 @@ const MAX_CELLS: f64 = (1 << 21) as f64;
 /// Replaces the points in every cell of a cubic grid by their mean, and their normals likewise.
 ///
 /// `edge` is the edge of a cell in meters, and `normals` has one entry per point. The cells are in
-/// the order of their coordinates. If normals cancel, their cell is left out, and so are points
-/// that are not finite. If `edge` is not positive, or so small that more than 2²¹ cells lie along
-/// an axis, the points are returned as they are.
+/// the order of their coordinates. Normals that are not finite do not count. Without others, or if
+/// these cancel, the normal of the cell is NaN. Points that are not finite are left out. If `edge`
+/// is not positive, or so small that more than 2²¹ cells lie along an axis, the points are returned
+/// as they are.
 ///
 /// Cost: O(n log n), about 50 ns per point.
 ///
@@ -44,6 +45,7 @@ pub fn voxel_downsample(
         })
         .collect();
     keys.sort_unstable();
+    let unknown = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
     let (mut means, mut directions) = (Vec::new(), Vec::new());
     for members in keys.chunk_by(|a, b| a.0 == b.0) {
         // Relative to the first member, sums stay small.
@@ -51,15 +53,13 @@ pub fn voxel_downsample(
         let (mut sum, mut direction) = (Vector3::zeros(), Vector3::zeros());
         for (_, i) in members {
             sum += points[*i as usize] - origin;
-            if let Some(normals) = normals {
-                direction += normals[*i as usize].into_inner();
+            let normal = normals.map(|normals| normals[*i as usize].into_inner());
+            if let Some(normal) = normal.filter(|n| n.iter().all(|x| x.is_finite())) {
+                direction += normal;
             }
         }
         if normals.is_some() {
-            let Some(direction) = UnitVector3::try_new(direction, 1e-3) else {
-                continue;
-            };
-            directions.push(direction);
+            directions.push(UnitVector3::try_new(direction, 1e-3).unwrap_or(unknown));
         }
         means.push(origin + sum / members.len() as f32);
     }
