@@ -15,7 +15,7 @@ use crate::warning::{CenterFault, Warning};
 const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
 
 /// Share of the diameter that rounding the coordinates may cost.
-pub(crate) const COARSE: f64 = 1e-3;
+const COARSE: f64 = 1e-3;
 
 /// Largest factor between the measured depth and that of the initial pose.
 const DEPTH_RATIO: f64 = 3.0;

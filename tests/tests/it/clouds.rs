@@ -177,6 +177,9 @@ fn clouds_far_from_their_origin_cause_a_warning() {
         found.warnings.iter().filter(coarse).count()
     };
     assert_eq!((coarse(&near), coarse(&far)), (0, 2));
+    // As large as a town: the step of 0.5 m is less than a thousandth of it, but not of the points.
+    let town: Vec<_> = near.iter().map(|point| point * 50.0).collect();
+    assert_eq!((coarse(&town), coarse(&moved(&town, &offset))), (0, 2));
 }
 
 /// A rotation of a cloud moves an origin far from it by much more than the stop rule allows.

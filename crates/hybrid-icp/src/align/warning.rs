@@ -8,7 +8,6 @@ use hicp_icp::Quality;
 use hicp_metric::{NormalEquations, Observability};
 use thiserror::Error;
 
-use crate::checks::COARSE;
 use crate::warning::Meters;
 
 /// Information of a direction, relative to the best determined one, below which only noise
@@ -21,6 +20,11 @@ const OTHER_UNIT: f64 = 30.0;
 
 /// Largest distance between adjacent coordinates that never matters, also in a cloud of one point.
 const FINE_METERS: f64 = 1e-6;
+
+/// Share of the distance between neighboring points that rounding the coordinates may cost.
+///
+/// The pose averages over all points, so that it is more accurate than one of them.
+const ROUNDING: f64 = 0.01;
 
 /// Largest number of pairs whose surface is examined.
 const MOST_PAIRS: usize = 4000;
@@ -79,7 +83,8 @@ pub enum CloudWarning {
         /// The cloud.
         side: CloudSide,
     },
-    /// The points are so far from their origin that `f32` rounds their shape.
+    /// The points are so far from their origin that `f32` rounds them by more than a hundredth of
+    /// the distance between neighbors.
     #[error(
         "{side}: coordinates are rounded to steps of {} so far from the origin: subtract an offset first",
         Meters(*step)
@@ -278,7 +283,10 @@ pub(super) fn warnings_of(side: CloudSide, cloud: &Cloud) -> impl Iterator<Item 
     let estimated = cloud.normals_from().filter(|neighbors| *neighbors > 0);
     let estimated = estimated.map(|neighbors| CloudWarning::NormalsEstimated { side, neighbors });
     let step = coordinate_step(cloud.surfels().iter().map(|surfel| surfel.point));
-    let coarse = step > FINE_METERS && step > COARSE * extent(cloud);
+    // As if the points were spread over a square.
+    #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
+    let spacing = extent(cloud) / (cloud.surfels().len() as f64).sqrt();
+    let coarse = step > FINE_METERS && step > ROUNDING * spacing;
     let coarse = coarse.then_some(CloudWarning::CoarseCoordinates { side, step });
     skipped.into_iter().chain(estimated).chain(coarse)
 }
