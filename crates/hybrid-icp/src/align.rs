@@ -289,7 +289,11 @@ impl Alignment {
     ///
     /// `None` if a direction is not determined ([`CloudWarning::Undetermined`]), or if the last
     /// iteration froze a rotation. It does not contain wrong pairs, so it is optimistic where the
-    /// clouds overlap in part.
+    /// clouds overlap in part. A nearest neighbor is rarely the same point of the surface, which
+    /// also makes it optimistic: the mean of ξᵀΣ⁻¹ξ, which is 6 if Σ is right, was 9 to 17 with
+    /// point-to-plane, 9 to 64 with GICP and 1200 to 1600 with point-to-point. These are random
+    /// samples of a closed surface, 3,000 points each, with noise of up to 1 % of its radius (100
+    /// pairs).
     #[must_use]
     pub fn covariance(&self) -> Option<Matrix6<f64>> {
         let is_open = |w: &CloudWarning| matches!(w, CloudWarning::Undetermined { .. });
