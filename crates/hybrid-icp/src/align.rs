@@ -393,6 +393,10 @@ pub fn align_in<'a>(
         None
     };
     alignment.warnings.extend(reason);
+    let iterations = outcome.iterations;
+    let unsettled = outcome.termination == Termination::IterationLimit;
+    let unsettled = unsettled.then_some(CloudWarning::Unsettled { iterations });
+    alignment.warnings.extend(unsettled);
     let pairs = session.workspace.pairs();
     let neighbors = CloudOptions::default().neighbors;
     let open = (outcome.quality).and_then(|q| undetermined(&q, pairs, neighbors));

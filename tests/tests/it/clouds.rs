@@ -566,6 +566,34 @@ fn few_pairs_are_not_absent_normals() {
     }
 }
 
+/// Point-to-point with half of an overlap slides for longer than the limit.
+#[test]
+fn the_limit_of_iterations_is_a_warning() {
+    let half = |low: f32, n: usize| -> Vec<_> {
+        let of_half = points(n).into_iter();
+        of_half
+            .filter(|p| (low..low + 0.07).contains(&p.z))
+            .collect()
+    };
+    let init = Isometry3::translation(0.0, 0.0, 0.004);
+    let mut pipeline = Icp {
+        selection: AllSamples,
+        association: NearestNeighbor::default(),
+        filter: (),
+        metric: hybrid_icp::metric::PointToPoint,
+        stop: (SmallMotion::default(), IterationLimit(5)),
+    };
+    let found = align(
+        &cloud(&half(-0.05, 2000)),
+        &cloud(&half(-0.03, 3000)),
+        &init,
+        &mut pipeline,
+    );
+    assert_eq!(found.outcome.termination, Termination::IterationLimit);
+    let unsettled = CloudWarning::Unsettled { iterations: 5 };
+    assert!(found.warnings.contains(&unsettled), "{:?}", found.warnings);
+}
+
 /// A scan of four walls in one plane, as of a laser scanner, determines no normals.
 #[test]
 fn point_to_point_keeps_target_points_without_a_normal() {

@@ -103,6 +103,12 @@ pub enum CloudWarning {
         /// Name of the part.
         part: &'static str,
     },
+    /// The limit of iterations ended the registration.
+    #[error("the pose still moved after {iterations} iterations: start again from it")]
+    Unsettled {
+        /// Number of iterations of all stages.
+        iterations: usize,
+    },
     /// Few points of the source have a counterpart in the target.
     #[error(
         "{:.0} % of the source points have a counterpart in the target: do not trust the pose",
