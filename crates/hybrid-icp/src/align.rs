@@ -1,5 +1,6 @@
 //! One call from two point clouds to the pose between them.
 
+mod settled;
 mod warning;
 
 use std::str::FromStr;
@@ -14,13 +15,13 @@ use hicp_core::{
     Vector3,
 };
 use hicp_icp::{
-    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, SmallMotion, Stage, Termination,
-    Workspace,
+    BoxedStage, Cascade, Icp, IterationLimit, Outcome, Session, Stage, Termination, Workspace,
 };
 use hicp_metric::{Conditioned, Degeneracy, Generalized, Minimize, PointToPlane, PointToPoint};
 use hicp_raster::Rasterizer;
 use thiserror::Error;
 
+use self::settled::Settled;
 pub use self::warning::{CloudSide, CloudWarning};
 use self::warning::{extents, is_measured, undetermined, warnings_of};
 
@@ -204,6 +205,9 @@ impl Registration {
     /// Builds the pipeline: every source point to its nearest target point, at most `max_distance`
     /// meters away, until a step moves less than 0.1 mm and 0.01°, or 100 iterations.
     ///
+    /// Of small and of large clouds, the shift is less than 3·10⁻³ of their RMS radius, and 3·10⁻⁵
+    /// of it is enough.
+    ///
     /// `None` runs twice, with a tenth and with a fiftieth of the source's diameter: it bridges
     /// large offsets, and then leaves out points without a counterpart.
     #[must_use]
@@ -233,7 +237,7 @@ where
         association: NearestNeighbor::new(Stride::Pixels(1), SearchIndex::BoxTree),
         filter,
         metric: metric.clone(),
-        stop: (SmallMotion::default(), IterationLimit(100)),
+        stop: (Settled, IterationLimit(100)),
     };
     match max_distance {
         Some(meters) => Box::new(stage(MaxDistance::meters(meters))),

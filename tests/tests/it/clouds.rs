@@ -203,6 +203,50 @@ fn the_number_of_iterations_does_not_depend_on_the_origin() {
     }
 }
 
+/// Places of a hilly square of 2 m.
+fn hills(places: impl Iterator<Item = [f32; 2]>, scale: f32) -> Vec<Point3<f32>> {
+    let height = |x: f32, y: f32| 1.0 + 0.15 * (3.0 * x).sin() * (2.3 * y).cos();
+    let place = |[x, y]: [f32; 2]| Point3::new(x, y, height(x, y)) * scale;
+    places.map(place).collect()
+}
+
+/// A shift of a small cloud is an error, even if it is less than a tenth of a millimeter.
+#[test]
+fn small_clouds_move_by_small_shifts() {
+    let scale = 0.003;
+    let grid = (0..1600).map(|i| [(i % 40) as f32 * 0.05, (i / 40) as f32 * 0.05]);
+    let source = hills(grid, scale);
+    let truth = Isometry3::translation(0.02 * f64::from(scale), 0.0, 0.0);
+    let target = moved(&source, &truth);
+    for found in registered(&cloud(&source), &cloud(&target), &Isometry3::identity()) {
+        let (_, distance) = se3::pose_distance(&found.target_from_source(), &truth);
+        assert!(distance < 1e-3 * f64::from(scale), "{distance}");
+    }
+}
+
+/// Pairs of a large cloud flip back and forth, which moves it by more than a tenth of a millimeter.
+#[test]
+fn large_clouds_settle() {
+    for seed in 0..4 {
+        let mut random = rng(seed);
+        let mut scan = || {
+            let places = [(); 3000].map(|()| [(); 2].map(|()| 2.0 * random.random::<f32>()));
+            let exact = hills(places.into_iter(), 500.0).into_iter();
+            let noisy = exact.map(|p| p + Vector3::z() * (5.0 * random.random::<f32>()));
+            cloud(&noisy.collect::<Vec<_>>())
+        };
+        let (source, target) = (scan(), scan());
+        for kind in [Registration::PointToPlane, Registration::Generalized] {
+            let found = aligned(kind, &source, &target);
+            assert_eq!(
+                found.outcome.termination,
+                Termination::Converged,
+                "{kind:?}"
+            );
+        }
+    }
+}
+
 /// Two spheres determine no rotation. Noise makes it look as if they did.
 #[test]
 fn spheres_have_no_covariance() {
