@@ -91,15 +91,17 @@ impl CoarseGrid {
         let pixel = |(u, v): (u32, u32)| {
             let (u, v) = (u * factor, v * factor);
             let masked = fine.mask().get(u, v) == Some(true);
-            let weight = weight((u, v), masked);
+            let certainty = weight((u, v), masked);
             let mut measured = fine.depth().get(u, v).unwrap_or(0.0);
             if measured > 0.0 {
-                total += u64::from(weight);
+                total += u64::from(certainty);
                 if masked && factor > 1 {
-                    measured = median_around(fine, (u, v), factor);
+                    // A thin part is not mistaken for the table around it.
+                    let counts = |place| 2 * weight(place, true) >= certainty;
+                    measured = median_around(fine, (u, v), factor, counts);
                 }
             }
-            (measured, weight)
+            (measured, certainty)
         };
         let inside = region.pixels().map(pixel).collect();
         Self {
@@ -163,8 +165,13 @@ impl CoarseGrid {
 
 /// Returns the median depth around a measured pixel of the mask.
 ///
-/// The window is two coarse pixels wide. Only masked pixels count.
-fn median_around(fine: &Observation, (u, v): (u32, u32), factor: u32) -> f32 {
+/// The window is two coarse pixels wide. Only masked pixels that meet a condition count.
+fn median_around(
+    fine: &Observation,
+    (u, v): (u32, u32),
+    factor: u32,
+    counts: impl Fn((u32, u32)) -> bool,
+) -> f32 {
     let (depth, mask) = (fine.depth(), fine.mask());
     let mut window = [0.0; (WINDOW * WINDOW) as usize];
     let mut count = 0;
@@ -174,6 +181,7 @@ fn median_around(fine: &Observation, (u, v): (u32, u32), factor: u32) -> f32 {
         if mask.get(a, b) == Some(true)
             && let Some(z) = depth.get(a, b)
             && z > 0.0
+            && counts((a, b))
         {
             window[count] = z;
             count += 1;
