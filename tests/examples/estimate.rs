@@ -1,6 +1,6 @@
 //! Compares `Refiner::estimate` with `search` from a rough pose, on the same simulated images.
 //!
-//! Run `cargo run --release -p hicp-tests --example estimate [CASES] [tuning|test] [MASK]`.
+//! Run `cargo run --release -p hicp-tests --example estimate CASES [tuning|test] [MASK] [PRESET]`.
 //!
 //! The images are those of `hicp_tests::tabletop`, and `MASK` is one of its kinds, `exact` if not
 //! given. A pose fails if its MSSD is above a tenth of the diameter, up to declared symmetries. The
@@ -20,8 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let cases: usize = arguments.next().map_or(Ok(1000), |text| text.parse())?;
     let objects = household(arguments.next().as_deref().unwrap_or("tuning"))?;
     let mask = arguments.next().unwrap_or_else(|| "exact".to_owned());
-    let kinds = MaskKind::ALL.into_iter();
-    let kind = kinds.clone().find(|kind| mask.starts_with(&kind.name()));
+    let kind = MaskKind::ALL.into_iter().find(|kind| kind.name() == mask);
     let kind = kind.ok_or(format!("{mask}: not a kind of mask"))?;
     let stage = match arguments.next() {
         Some(name) => name.parse()?,

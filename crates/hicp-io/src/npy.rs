@@ -164,9 +164,10 @@ fn number_type(descr: &str) -> Option<NumberType> {
     Some(NumberType { kind, bytes })
 }
 
-/// Returns the names and numbers of the arrays of an archive of several arrays.
+/// Returns the names and numbers of the arrays of an archive, unless it has a single array.
 ///
-/// Arrays of more than `most` numbers, and of other things, are left out.
+/// Returns `None` for that, and for other files. Arrays of more than `most` numbers, and those that
+/// are not numbers, are left out.
 pub(crate) fn small_arrays(
     path: &Path,
     content: &[u8],

@@ -205,8 +205,8 @@ impl Registration {
     /// Builds the pipeline: every source point to its nearest target point, at most `max_distance`
     /// meters away, until a step moves less than 0.1 mm and 0.01°, or 100 iterations.
     ///
-    /// Of small and of large clouds, the shift is less than 3·10⁻³ of their RMS radius, and 3·10⁻⁵
-    /// of it is enough.
+    /// If the RMS radius of the paired points is below 33 mm, 3·10⁻³ of it replaces the 0.1 mm. If
+    /// it is above 3.3 m, 3·10⁻⁵ of it does.
     ///
     /// `None` runs twice, with a tenth and with a fiftieth of the source's diameter: it bridges
     /// large offsets, and then leaves out points without a counterpart.

@@ -339,7 +339,8 @@ fn warning_of_center(camera: &PinholeCamera) -> Option<Warning> {
     fault.map(|fault| Warning::Center { cx, cy, fault })
 }
 
-/// Returns whether a box has pixels of an image, as [`Mask::in_box`](hicp_core::Mask::in_box) rounds it.
+/// Returns whether a box has pixels of an image, as [`Mask::in_box`](hicp_core::Mask::in_box)
+/// rounds it.
 ///
 /// The box is x and y of its corner, width and height; the size of the image is width and height,
 /// in pixels. A box of less than a pixel has none.
@@ -359,8 +360,9 @@ pub fn box_overlaps([x, y, w, h]: [f64; 4], (width, height): (u32, u32)) -> bool
 
 /// Returns [`Warning::Box`] if a box ends outside of an image, as one of two corners often does.
 ///
-/// The box is x and y of its corner, width and height, as for [`Mask::in_box`](hicp_core::Mask::in_box); the size of the
-/// image is width and height, in pixels. A tenth of the box may be outside.
+/// The box is x and y of its corner, width and height, as for
+/// [`Mask::in_box`](hicp_core::Mask::in_box); the size of the image is width and height, in
+/// pixels. A tenth of the box may be outside.
 ///
 /// ```
 /// use hybrid_icp::{Warning, checks::warning_of_box};

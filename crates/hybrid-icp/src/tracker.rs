@@ -76,7 +76,7 @@ pub struct Tracker {
     matcher: Matcher,
     config: TrackerConfig,
     motion: Option<Motion>,
-    /// The last pose that a search found, until it has been tracked for some time.
+    /// The last pose that a search found, until images have shown the object there for some time.
     trial: Option<Trial>,
     state: TrackState,
     /// Time since the image last showed the object, seconds.
@@ -201,6 +201,7 @@ impl Tracker {
             None => true,
         };
         let doubtful = unsure || !confirmed;
+        let mut searched = false;
         let search = |f: Found| {
             let enough = f.is_clear() && confirmed;
             !enough && !f.is_hidden() && (doubtful || !f.explains())
@@ -220,6 +221,7 @@ impl Tracker {
                     confirmed,
                     seen: 0.0,
                 });
+                searched = true;
             }
         }
         self.unseen = if seen.is_some() {
@@ -240,7 +242,7 @@ impl Tracker {
                 motion = trial.without;
                 self.trial = None;
             }
-            (_, Some(trial)) if confirmed && seen.is_some() => {
+            (_, Some(trial)) if confirmed && seen.is_some() && !searched => {
                 trial.seen += seconds;
                 if trial.seen > TRIAL_SECONDS {
                     self.trial = None;

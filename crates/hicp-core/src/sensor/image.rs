@@ -283,10 +283,11 @@ impl Mask {
         Ok(Self(raster, region))
     }
 
-    /// Creates a mask of the pixels of a bounding box: x and y of its corner, width and height.
+    /// Creates a mask of the pixels of a bounding box: left and upper side, width and height.
     ///
     /// The box is in pixels, in the form of BOP and COCO. Its sides are rounded to pixels, and
-    /// parts outside of the image are ignored. Cost: as [`Mask::in_region`].
+    /// parts outside of the image are ignored. A number that is NaN may make it empty. Cost: as
+    /// [`Mask::in_region`].
     ///
     /// # Panics
     ///

@@ -72,8 +72,8 @@ impl ReadLimits {
         image_size: (u32, u32),
     ) -> Result<CameraFile, IoError> {
         let path = path.as_ref();
-        let root = document::read(self, path, EXPECTED)?;
-        if is_bop(&root) {
+        let (root, is_json) = document::read(self, path, EXPECTED)?;
+        if is_json && is_bop(&root) {
             return self.read_camera_json(path, image_size);
         }
         let mut found = Vec::new();

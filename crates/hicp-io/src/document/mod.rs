@@ -29,13 +29,20 @@ const MOST_NUMBERS: usize = 1000;
 ///
 /// Text of numbers only becomes an array with an array for each line. An NPY array becomes a flat
 /// array of its numbers, by rows, and an NPZ archive of several arrays an object of such arrays.
-pub(crate) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<Value, IoError> {
+/// The flag is `true` if the file is JSON.
+pub(crate) fn read(
+    limits: &ReadLimits,
+    path: &Path,
+    expected: &str,
+) -> Result<(Value, bool), IoError> {
     let content = limits.read(path, Limit::SMALL_JSON_BYTES)?;
-    match Format::of(&content) {
+    let format = Format::of(&content);
+    let is_json = format == Some(Format::Json);
+    let value = match format {
         #[cfg(feature = "npy")]
         Some(Format::Npy | Format::Npz) => {
             if let Some(arrays) = npy::small_arrays(path, &content, MOST_NUMBERS)? {
-                return Ok(arrays.into_iter().collect());
+                return Ok((arrays.into_iter().collect(), false));
             }
             let array = npy::Array::parse(limits, path, &content, &[])?;
             match array.shape.iter().product() {
@@ -68,7 +75,8 @@ pub(crate) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<V
             }
         }
         _ => Err(format::refuse(path, &content, expected)),
-    }
+    };
+    Ok((value?, is_json))
 }
 
 /// Returns the numbers of a value, and of the arrays in it, or of the member `data` of an object.

@@ -50,11 +50,11 @@ impl ReadLimits {
         unit: Option<LengthUnit>,
     ) -> Result<PoseFile, IoError> {
         let path = path.as_ref();
-        let root = document::read(self, path, EXPECTED)?;
+        let (root, is_json) = document::read(self, path, EXPECTED)?;
         let is_bop = root
             .get("cam_R_m2c")
             .is_some_and(|r| r.get(0).is_none_or(Value::is_number));
-        if is_bop && unit.is_none_or(|unit| unit == LengthUnit::Millimeters) {
+        if is_json && is_bop && unit.is_none_or(|unit| unit == LengthUnit::Millimeters) {
             return self.read_pose_json(path);
         }
         let refuse = |found: String, expected: &str| {

@@ -20,6 +20,7 @@ fn cameras_of_every_form_are_the_same() {
     for name in [
         "camera_k.txt",
         "camera_k.npy",
+        "camera_bop.npz",
         "camera_open3d.json",
         "camera_realsense.json",
         "camera_ros_topic.yaml",
@@ -29,6 +30,7 @@ fn cameras_of_every_form_are_the_same() {
         assert_eq!((file.camera, file.distortion), (camera(), None), "{name}");
     }
     assert_eq!(read("camera_rows.json").depth_scale, Some(0.1));
+    assert_eq!(read("camera_bop.npz").depth_scale, Some(0.1));
 }
 
 #[test]
@@ -260,6 +262,7 @@ fn poses_of_every_form_are_the_same() {
         check(name, Some(LengthUnit::Millimeters), 0.001);
     }
     check("pose_bop_rows.json", None, 1.0);
+    check("pose_bop.npz", None, 1.0);
     check("pose_bop_rows.json", Some(LengthUnit::Meters), 1000.0);
 
     // A result of Python as JSON.
@@ -374,7 +377,7 @@ fn registered_depth_is_that_of_the_other_camera() {
     assert!((80..96).all(|v| (10..100).all(|u| v > 90 || seen.get(u, v) == Some(1.1))));
     // Behind the right edge of the square, the depth camera saw nothing.
     assert_eq!(at(0.065, 0.0, 0.75), 0.0);
-    // Nor does it if the cameras are rolled against each other.
+    // A flat wall has no holes if the cameras are rolled against each other.
     let flat = DepthImage::collect(64, 48, vec![1.0; 64 * 48]).unwrap();
     for degrees in [3.0_f64, 30.0, 45.0] {
         let rolled = Isometry3::rotation(Vector3::z() * degrees.to_radians());

@@ -199,7 +199,7 @@ fn gltf_textures_come_from_files_and_buffers_and_have_a_factor() {
         (red - 120.0).abs() < 3.0 && green == 250.0 && blue == 0.0,
         "{red}"
     );
-    // A transform of the texture names other coordinates, and turns them around the corner.
+    // A transform of the texture names other coordinates, and rotates them around the corner.
     let transform = r#"{"index": 0, "texCoord": 7, "extensions": {"KHR_texture_transform":
         {"texCoord": 0, "offset": [0, 1], "rotation": 1.5707963267948966}}}"#;
     let text = gltf(r#"{"bufferView": 3}"#, "[1, 1, 1, 1]", bin.len());

@@ -230,8 +230,9 @@ impl<'a> Term<'a> {
 
     /// Adds the rows to a system of pairs whose weights sum up to `weight`.
     fn add_to(&self, system: &mut NormalEquations, weight: f64) {
-        // The weights of these rows say nothing about the noise of the pairs.
-        system.variance = system.row_variance();
+        // The weights of these rows say nothing about the noise of the pairs. If the pairs do not
+        // determine it, there is no covariance.
+        system.variance = Some(system.row_variance().unwrap_or(f64::NAN));
         let camera = self.colors.observation.camera();
         self.colors.visit(|sample, smooth| {
             let (point, light) = (&sample.point, light(sample));

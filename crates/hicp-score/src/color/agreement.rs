@@ -6,8 +6,8 @@ use hicp_core::{Context, Isometry3, Problem};
 use crate::color::cells::{Cells, ColorEvidence, Shading};
 use crate::score::Score;
 
-/// Number of compared pixels in the box of the render, about. The step is an integer, so there may
-/// be three times as many.
+/// Number of pixels in the box of the render from which the step is computed. The step is rounded
+/// down, so up to three times as many are compared.
 const PIXELS: usize = 2000;
 
 /// Scores how well the colors of a model agree with the color image: 0 perfectly, 0.5 not at all.
@@ -21,8 +21,8 @@ const PIXELS: usize = 2000;
 /// An object of one color, an overexposed image, and a problem without colors are no evidence, and
 /// score 0.5 at every pose: see [`ColorAgreement::measure`].
 ///
-/// Cost: one render (shared with other components that use this pose), and some 2000 to 6000
-/// pixels of the box around it, about 100 ns each.
+/// Cost: one render (shared with other components that use this pose), and at most some
+/// 6000 pixels of the box around it, about 100 ns each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ColorAgreement {
     /// The effects of light to remove.

@@ -34,7 +34,7 @@ pub enum Shading {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ColorEvidence {
-    /// The correlation of the colors of model and image, −1 to 1.
+    /// The correlation of the colors of model and image, −1 to 1. An image of one color has 0.
     ///
     /// A gain and an offset per channel do not change it.
     pub correlation: f64,

@@ -161,7 +161,7 @@ pub(crate) struct RegionOptions {
     #[command(flatten)]
     pub(super) mask_options: MaskOptions,
     /// Without a mask: a box around the object, in pixels: its left and upper side, width and
-    /// height. The pipelines of the paper take a table in the box for the object.
+    /// height. `hybrid`, `hybrid-visible` and the baselines take a table in it for the object.
     #[arg(
         long,
         value_name = "X,Y,W,H",

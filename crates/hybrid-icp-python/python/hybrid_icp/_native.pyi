@@ -1435,8 +1435,8 @@ def run_program(words: Sequence[str]) -> int:
 def mask_in_box(bbox: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.bool_]:
     """Returns the mask of a box, for a detector without a segmentation.
 
-    `local`, `search`, `auto`, `color` and `estimate` give a table in the box no weight. The
-    pipelines of the paper take it for the object.
+    `local`, `search`, `auto`, `color` and `estimate` give a table in the box no weight.
+    `hybrid`, `hybrid-visible` and the baselines take it for the object.
 
     Parameters
     ----------
@@ -1454,7 +1454,7 @@ def mask_in_box(bbox: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.bool_]:
     Raises
     ------
     InputError
-        If the box has not four numbers, or no pixel in the image.
+        If `bbox` does not have four numbers, or the box has no pixel in the image.
 
     Examples
     --------

@@ -45,8 +45,8 @@ fn check_size(
 
 /// Returns the mask of a box, for a detector without a segmentation.
 ///
-/// `local`, `search`, `auto`, `color` and `estimate` give a table in the box no weight. The
-/// pipelines of the paper take it for the object.
+/// `local`, `search`, `auto`, `color` and `estimate` give a table in the box no weight.
+/// `hybrid`, `hybrid-visible` and the baselines take it for the object.
 ///
 /// Parameters
 /// ----------
@@ -64,7 +64,7 @@ fn check_size(
 /// Raises
 /// ------
 /// InputError
-///     If the box has not four numbers, or no pixel in the image.
+///     If `bbox` does not have four numbers, or the box has no pixel in the image.
 ///
 /// Examples
 /// --------

@@ -103,8 +103,10 @@ pub enum CloudWarning {
         /// Name of the part.
         part: &'static str,
     },
-    /// The limit of iterations ended the registration.
-    #[error("the pose still moved after {iterations} iterations: start again from it")]
+    /// The limit of iterations ended the registration, perhaps before it converged.
+    #[error(
+        "the registration ended at its limit after {iterations} iterations, perhaps before it converged: start again from the pose"
+    )]
     Unsettled {
         /// Number of iterations of all stages.
         iterations: usize,

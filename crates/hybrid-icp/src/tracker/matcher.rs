@@ -34,7 +34,7 @@ const ROUGH_DIAMETERS: f64 = 0.05;
 const START_NOISE: f64 = 0.02;
 /// Rise of the score up to which an image does not contradict a move.
 const SAME_SCORE: f64 = 0.03;
-/// Factor on the deviation of an unknown direction with which it is not information.
+/// Factor on the deviation of an unknown direction that makes it no information at all.
 const NOTHING: f64 = 1e3;
 /// Distance from the prediction, beyond four standard deviations, that is a jump, in radii.
 const JUMP_RADII: f64 = 0.35;
@@ -215,9 +215,11 @@ impl Matcher {
     ///
     /// A direction of little information is unknown if the image does not contradict a move by a
     /// tenth of the diameter in it, because facets of a mesh and noise have some in each one.
-    /// An example is the rotation of a mug whose handle is hidden. Its large variance bounds
-    /// predictions that deviate by more, in meters. It must not make others more certain, image by
-    /// image.
+    /// An example is the rotation of a mug whose handle is hidden.
+    ///
+    /// `deviation` is that of the prediction, meters. If it is large, the variance of an unknown
+    /// direction bounds it. Otherwise the variance is so large that images without information do
+    /// not add up to a known direction.
     pub(super) fn covariance(
         &mut self,
         observation: &Observation,

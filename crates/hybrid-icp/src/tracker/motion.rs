@@ -123,8 +123,8 @@ impl Motion {
 
     /// Moves the center and rotates the object around it, and with it its uncertain directions.
     ///
-    /// An example is the axis of a mug whose handle is hidden. If the covariances did not turn with
-    /// it, a tilt of the axis would count as a rotation around it.
+    /// An example is the axis of a mug whose handle is hidden. If the covariances did not rotate
+    /// with it, a tilt of the axis would count as a rotation around it.
     fn apply(&mut self, step: &Vector6<f64>) {
         self.pose = moved(&self.pose, &self.center, step);
         let turn = rotation(step);

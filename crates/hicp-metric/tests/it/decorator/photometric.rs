@@ -123,6 +123,10 @@ fn the_variance_is_that_of_the_pairs() {
     let with = metric.system(&iteration, &pairs).unwrap();
     let (with, before) = (with.covariance().unwrap().diagonal(), plain.diagonal());
     assert!(with.iter().zip(&before).all(|(with, before)| with < before));
+    // Six pairs do not show their noise, and thousands of colors do not either.
+    let six = at(&pose, &messy(&mut Numbers(3), 6));
+    let with = metric.system(&iteration, &six).unwrap();
+    assert_eq!((with.covariance(), with.rows() > 1000), (None, true));
 }
 
 #[test]
