@@ -164,10 +164,13 @@ fn number_type(descr: &str) -> Option<NumberType> {
     Some(NumberType { kind, bytes })
 }
 
+/// The largest number of arrays of an archive that are read, which bounds the time.
+const MOST_ARRAYS: usize = 256;
+
 /// Returns the names and numbers of the arrays of an archive, unless it has a single array.
 ///
-/// Returns `None` for that, and for other files. Arrays of more than `most` numbers, and those that
-/// are not numbers, are left out.
+/// Returns `None` for that, and for other files. Arrays of more than `most` numbers, those that are
+/// not numbers, and those after the first [`MOST_ARRAYS`] are left out.
 pub(crate) fn small_arrays(
     path: &Path,
     content: &[u8],
@@ -181,7 +184,7 @@ pub(crate) fn small_arrays(
         return Ok(None);
     }
     let mut arrays = BTreeMap::new();
-    for member in &archive.members {
+    for member in archive.members.iter().take(MOST_ARRAYS) {
         // A header has at most 64 KiB.
         let content = archive.extract(member, (1 << 16) + 8 * most as u64)?;
         if let Ok(array) = parse_npy(path, Cow::Owned(content))
