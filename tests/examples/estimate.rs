@@ -1,6 +1,7 @@
 //! Compares `Refiner::estimate` with `search` from a rough pose, on the same simulated images.
 //!
-//! Run `cargo run --release -p hicp-tests --example estimate CASES [tuning|test] [MASK] [PRESET]`.
+//! Run `cargo run --release -p hicp-tests --example estimate`, and then, if not the defaults:
+//! `[CASES] [tuning|test] [MASK] [PRESET]`.
 //!
 //! The images are those of `hicp_tests::tabletop`, and `MASK` is one of its kinds, `exact` if not
 //! given. A pose fails if its MSSD is above a tenth of the diameter, up to declared symmetries. The

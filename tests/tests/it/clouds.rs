@@ -1,12 +1,15 @@
 //! Registration of point clouds: recovery, equivariance, hostile input, parts that need an image.
 
+mod normals;
+mod sizes;
+
 use hicp_sim::{Household, rng, rotation};
 use hybrid_icp::association::{
     AllSamples, BoundaryTargets, Length, MaxDistance, NearestNeighbor, Projective, Reciprocal,
-    VisibleSurface, VoxelGrid, estimate_normals, voxel_downsample,
+    VisibleSurface, VoxelGrid,
 };
 use hybrid_icp::core::{
-    Cloud, Isometry3, Model, Point3, Problem, Surfel, UnitVector3, Vector3, sample_surface, se3,
+    Cloud, Isometry3, Model, Point3, Problem, Surfel, Vector3, sample_surface, se3,
 };
 use hybrid_icp::icp::{
     Guard, Icp, IterationLimit, Session, SmallMotion, Stage, Termination, Workspace,
@@ -140,111 +143,6 @@ fn hostile_clouds_end_in_an_honest_outcome() {
     with_nan.extend(nan);
     let cloud = cloud(&with_nan);
     assert_eq!((cloud.surfels().len(), cloud.n_skipped()), (1000, 3));
-}
-
-#[test]
-fn clouds_in_two_units_cause_a_warning() {
-    let target = points(1000);
-    let millimeters: Vec<_> = target.iter().map(|point| point * 1000.0).collect();
-    let ratio = |source: &[Point3<f32>], init: &Isometry3<f64>| {
-        let found = &registered(&cloud(source), &cloud(&target), init)[0];
-        found.warnings.iter().find_map(|warning| match warning {
-            CloudWarning::Extents {
-                source_meters,
-                target_meters,
-            } => Some((source_meters / target_meters).round()),
-            _ => None,
-        })
-    };
-    assert_eq!(ratio(&millimeters, &Isometry3::identity()), Some(1000.0));
-    // No overlap alone is not a reason.
-    assert_eq!(
-        ratio(&target, &Isometry3::translation(50.0, 0.0, 0.0)),
-        None
-    );
-}
-
-/// Two scans in coordinates of a map, of which one is moved by less than `f32` resolves there.
-#[test]
-fn clouds_far_from_their_origin_cause_a_warning() {
-    let offset = Isometry3::translation(500_000.0, 5_000_000.0, 0.0);
-    // As large as a house.
-    let near: Vec<_> = points(1000).iter().map(|point| point * 100.0).collect();
-    let far = moved(&near, &offset);
-    let coarse = |points: &[Point3<f32>]| {
-        let found = &registered(&cloud(points), &cloud(points), &Isometry3::identity())[0];
-        let coarse = |w: &&CloudWarning| matches!(w, CloudWarning::CoarseCoordinates { .. });
-        found.warnings.iter().filter(coarse).count()
-    };
-    assert_eq!((coarse(&near), coarse(&far)), (0, 2));
-    // As large as a town: the step of 0.5 m is less than a thousandth of it, but not of the points.
-    let town: Vec<_> = near.iter().map(|point| point * 50.0).collect();
-    assert_eq!((coarse(&town), coarse(&moved(&town, &offset))), (0, 2));
-}
-
-/// A rotation of a cloud moves an origin far from it by much more than the stop rule allows.
-#[test]
-fn the_number_of_iterations_does_not_depend_on_the_origin() {
-    let truth = pose([0.05, -0.04, 0.06], [0.004, 0.003, -0.005]);
-    for kind in Registration::ALL {
-        let [near, far @ ..] = [0.0, 10.0, 100.0].map(|meters| {
-            let shift = Isometry3::translation(meters, -0.7 * meters, 0.3 * meters);
-            let [source, target] = [(1200, shift), (1500, shift * truth)]
-                .map(|(n, pose)| cloud(&moved(&points(n), &pose)));
-            let found = aligned(kind, &source, &target);
-            assert_eq!(found.outcome.termination, Termination::Converged);
-            found.outcome.iterations
-        });
-        // The coordinates are rounded to `f32`, in steps of up to 8 µm.
-        assert!(
-            far.iter().all(|n| *n <= near + 5),
-            "{kind:?}: {near} {far:?}"
-        );
-    }
-}
-
-/// Places of a hilly square of 2 m.
-fn hills(places: impl Iterator<Item = [f32; 2]>, scale: f32) -> Vec<Point3<f32>> {
-    let height = |x: f32, y: f32| 1.0 + 0.15 * (3.0 * x).sin() * (2.3 * y).cos();
-    let place = |[x, y]: [f32; 2]| Point3::new(x, y, height(x, y)) * scale;
-    places.map(place).collect()
-}
-
-/// A shift of a small cloud is an error, even if it is less than a tenth of a millimeter.
-#[test]
-fn small_clouds_move_by_small_shifts() {
-    let scale = 0.003;
-    let grid = (0..1600).map(|i| [(i % 40) as f32 * 0.05, (i / 40) as f32 * 0.05]);
-    let source = hills(grid, scale);
-    let truth = Isometry3::translation(0.02 * f64::from(scale), 0.0, 0.0);
-    let target = moved(&source, &truth);
-    for found in registered(&cloud(&source), &cloud(&target), &Isometry3::identity()) {
-        let (_, distance) = se3::pose_distance(&found.target_from_source(), &truth);
-        assert!(distance < 1e-3 * f64::from(scale), "{distance}");
-    }
-}
-
-/// Pairs of a large cloud flip back and forth, which moves it by more than a tenth of a millimeter.
-#[test]
-fn large_clouds_settle() {
-    for seed in 0..4 {
-        let mut random = rng(seed);
-        let mut scan = || {
-            let places = [(); 3000].map(|()| [(); 2].map(|()| 2.0 * random.random::<f32>()));
-            let exact = hills(places.into_iter(), 500.0).into_iter();
-            let noisy = exact.map(|p| p + Vector3::z() * (5.0 * random.random::<f32>()));
-            cloud(&noisy.collect::<Vec<_>>())
-        };
-        let (source, target) = (scan(), scan());
-        for kind in [Registration::PointToPlane, Registration::Generalized] {
-            let found = aligned(kind, &source, &target);
-            assert_eq!(
-                found.outcome.termination,
-                Termination::Converged,
-                "{kind:?}"
-            );
-        }
-    }
 }
 
 /// Two spheres determine no rotation. Noise makes it look as if they did.
@@ -501,115 +399,6 @@ fn a_model_is_a_source_for_a_cloud() {
     );
 }
 
-#[test]
-fn estimated_normals_are_those_of_the_surface() {
-    let sphere: Vec<_> = (0..4000)
-        .map(|i| {
-            let (z, turn) = (1.0 - (i as f32 + 0.5) / 2000.0, i as f32 * 2.399_963_2);
-            let radius = (1.0 - z * z).sqrt();
-            Point3::new(radius * turn.cos(), radius * turn.sin(), z)
-        })
-        .collect();
-    for (point, normal) in sphere.iter().zip(estimate_normals(&sphere, 10)) {
-        // The origin is the center, and normals face it.
-        assert!(normal.unwrap().dot(&point.coords) < -0.999, "{point}");
-    }
-    assert!(estimate_normals(&sphere, 2).iter().all(Option::is_none));
-    assert!(estimate_normals(&sphere, 0).iter().all(Option::is_none));
-}
-
-#[test]
-fn voxels_hold_the_mean_of_their_points() {
-    let points = [
-        [0.0, 0.0, 0.0],
-        [0.3, 0.0, 0.0],
-        [5.2, 0.1, 0.0],
-        [f32::NAN, 0.0, 0.0],
-    ];
-    let points = points.map(Point3::from);
-    let (means, _) = voxel_downsample(&points, None, 1.0);
-    assert_eq!(means, [Point3::new(0.15, 0.0, 0.0), points[2]]);
-    for edge in [0.0, -1.0, f64::NAN, 1e-9] {
-        assert_eq!(voxel_downsample(&points, None, edge).0.len(), 4);
-    }
-    assert_eq!(voxel_downsample(&[], None, 1.0).0, []);
-    let up = Vector3::z_axis();
-    let unknown = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
-    let normals = |given: [_; 4]| voxel_downsample(&points, Some(&given), 1.0).1.unwrap();
-    // A point without a normal leaves its cell those of the others.
-    assert_eq!(normals([up, up, up, -up]), [up, up]);
-    assert_eq!(normals([unknown, up, up, -up]), [up, up]);
-    let options = CloudOptions {
-        voxel_meters: Some(1.0),
-        neighbors: 3,
-    };
-    for [a, b] in [[unknown, unknown], [up, -up]] {
-        let given = [a, b, up, up];
-        assert!(normals(given)[0].x.is_nan());
-        let raised = points.map(|point| point + up.into_inner());
-        let target = |kind| options.target_of(kind, &raised, Some(&given)).unwrap();
-        let counts = |cloud: Cloud| (cloud.surfels().len(), cloud.n_skipped());
-        // One point has no place, and one of the two cells no normal.
-        assert_eq!(counts(target(Registration::PointToPoint)), (2, 1));
-        assert_eq!(counts(target(Registration::PointToPlane)), (1, 2));
-    }
-    let surfel = |point| Surfel { point, normal: up };
-    let given = Cloud::new(points.map(surfel));
-    assert_eq!((given.n_skipped(), given.normals_from()), (1, None));
-    let error = CloudOptions::default().cloud(&points, Some(&[up]));
-    assert!(
-        error
-            .unwrap_err()
-            .to_string()
-            .contains("1 normals for 4 points")
-    );
-}
-
-/// Sources without normals register as they do with them, if the error does not need them.
-/// Otherwise the initial pose is kept.
-#[test]
-fn absent_normals_of_the_source_are_never_used() {
-    let options = CloudOptions::default();
-    let target = cloud(&points(4000));
-    let init = Isometry3::translation(0.002, -0.001, 0.003);
-    for kind in Registration::ALL {
-        let full = options.cloud(&points(2000), None).unwrap();
-        let bare = options
-            .for_source_of(kind)
-            .cloud(&points(2000), None)
-            .unwrap();
-        let found = |source| align(source, &target, &init, &mut *kind.build(None));
-        assert_eq!(found(&full).outcome, found(&bare).outcome);
-        let without = Cloud::without_normals(points(2000));
-        if kind == Registration::Generalized {
-            assert_eq!(found(&without).target_from_source(), init);
-            let side = CloudSide::Source;
-            let last = found(&without).warnings.pop();
-            assert_eq!(last, Some(CloudWarning::NoNormals { side }));
-        } else {
-            assert_eq!(found(&full).outcome, found(&without).outcome);
-        }
-    }
-}
-
-/// Sources without normals are not at fault if the clouds touch in too few points.
-#[test]
-fn few_pairs_are_not_absent_normals() {
-    let row = |i: u16| Point3::new(0.01 * f32::from(i), 0.1 * f32::from(i % 7), 0.5);
-    let near: Vec<_> = (0..50).map(row).collect();
-    let touching: Vec<_> = (49..90).map(row).collect();
-    for kind in [Registration::PointToPoint, Registration::PointToPlane] {
-        let options = CloudOptions::default();
-        let source = options.for_source_of(kind).cloud(&near, None).unwrap();
-        let target = options.target_of(kind, &touching, None).unwrap();
-        let init = Isometry3::identity();
-        let found = align(&source, &target, &init, &mut *kind.build(Some(0.005)));
-        assert_eq!(found.outcome.termination, Termination::Degenerate);
-        let little = CloudWarning::LittleOverlap { fitness: 0.0 };
-        assert_eq!(found.warnings.last(), Some(&little), "{kind:?}");
-    }
-}
-
 /// Point-to-point with half of an overlap slides for longer than the limit.
 #[test]
 fn the_limit_of_iterations_is_a_warning() {
@@ -636,70 +425,4 @@ fn the_limit_of_iterations_is_a_warning() {
     assert_eq!(found.outcome.termination, Termination::IterationLimit);
     let unsettled = CloudWarning::Unsettled { iterations: 5 };
     assert!(found.warnings.contains(&unsettled), "{:?}", found.warnings);
-}
-
-/// A scan of four walls in one plane, as of a laser scanner, determines no normals.
-#[test]
-fn point_to_point_keeps_target_points_without_a_normal() {
-    let wall = |i: u16| (f32::from(i % 100) - 50.0) / 25.0;
-    let walls: Vec<_> = (0..400)
-        .map(|i| match i / 100 {
-            0 => Point3::new(wall(i), 2.0, 1.0),
-            1 => Point3::new(wall(i), -1.5, 1.0),
-            2 => Point3::new(2.0, wall(i), 1.0),
-            _ => Point3::new(-2.0, wall(i), 1.0),
-        })
-        .collect();
-    let truth = pose([0.0, 0.0, 0.004], [0.004, -0.003, 0.0]);
-    let (options, moved) = (CloudOptions::default(), moved(&walls, &truth));
-    let register = |kind: Registration| {
-        let source = options.for_source_of(kind).cloud(&walls, None).unwrap();
-        let target = options.target_of(kind, &moved, None).unwrap();
-        align(
-            &source,
-            &target,
-            &Isometry3::identity(),
-            &mut kind.build(None),
-        )
-    };
-    let found = register(Registration::PointToPoint);
-    let (angle, distance) = se3::pose_distance(&found.target_from_source(), &truth);
-    assert!(angle < 1e-4 && distance < 1e-4, "{angle} {distance}");
-    let estimated = CloudWarning::NormalsEstimated {
-        side: CloudSide::Target,
-        neighbors: 20,
-    };
-    assert_eq!((found.fitness(), found.warnings), (1.0, vec![estimated]));
-    // The other errors need normals, so they skip points, with a warning.
-    for kind in [Registration::PointToPlane, Registration::Generalized] {
-        let skipped = |w: &CloudWarning| matches!(w, CloudWarning::PointsSkipped { .. });
-        assert!(register(kind).warnings.iter().any(skipped), "{kind:?}");
-    }
-}
-
-/// The other points of such a target keep their normals, for the warnings.
-#[test]
-fn points_without_a_normal_hide_no_open_direction() {
-    let source = view(Household::Can, 12_000, 0.0, 1e-3);
-    let mut target = view(Household::Can, 13_000, 1.0, 1e-3);
-    let cable = (0..30_u8).map(|i| Point3::new(0.5, 0.0, 0.01 * f32::from(i)));
-    let kind = Registration::PointToPoint;
-    let options = CloudOptions::default();
-    let source = options.for_source_of(kind).cloud(&source, None).unwrap();
-    let align = |points: &[Point3<f32>]| {
-        let target = options.target_of(kind, points, None).unwrap();
-        assert_eq!(target.n_skipped(), 0);
-        align(
-            &source,
-            &target,
-            &Isometry3::identity(),
-            &mut kind.build(None),
-        )
-    };
-    let alone = align(&target);
-    target.extend(cable);
-    let found = align(&target);
-    assert!(matches!(open(&alone), Some((1, Some(_)))), "{alone:?}");
-    assert_eq!(open(&found), open(&alone));
-    assert_eq!(found.outcome.quality, alone.outcome.quality);
 }

@@ -37,18 +37,11 @@ impl DepthPlane {
         (0..tries).filter_map(move |_| Self::fit([draw(), draw(), draw()].into_iter()))
     }
 
-    /// Returns the inverse depth of the plane at a pixel; not positive behind the camera.
-    #[must_use]
-    #[inline]
-    pub fn inverse_depth(&self, u: f64, v: f64) -> f64 {
-        self.0.dot(&Vector3::new(1.0, u, v))
-    }
-
     /// Returns the depth of the plane at a pixel; infinite behind the camera.
     #[must_use]
     #[inline]
     pub fn depth(&self, u: f64, v: f64) -> f64 {
-        let inverse = self.inverse_depth(u, v);
+        let inverse = self.0.dot(&Vector3::new(1.0, u, v));
         if inverse > 0.0 {
             1.0 / inverse
         } else {

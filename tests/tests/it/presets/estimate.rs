@@ -78,7 +78,7 @@ fn objects_in_boxes_are_found_on_a_table() {
         right += usize::from(error < 0.1 * points.diameter());
         sure += usize::from(found.confidence >= 0.95);
     }
-    // Without the weights of pixels, the table would be taken for the object in most boxes.
+    // The pixels of the table have no weight.
     assert!(cases > 20 && 10 * right > 8 * cases, "{right} of {cases}");
     assert!(2 * sure > cases, "{sure} of {cases}");
 }
