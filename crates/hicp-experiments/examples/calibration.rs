@@ -27,6 +27,7 @@ struct Sample {
     /// The object, and the index of the trajectory.
     trajectory: (String, u64),
     pose: Isometry3<f64>,
+    truth: Isometry3<f64>,
     error: Vector6<f64>,
     unit: UnitCovariance,
     mve: f64,
@@ -108,6 +109,7 @@ fn sample(seen: &TrajectoryStep<'_>) -> Result<Option<Sample>, Failed> {
     Ok(Some(Sample {
         trajectory: (seen.object.name.clone(), seen.trajectory),
         pose,
+        truth,
         error: se3::log(&(truth * pose.inverse())),
         unit: UnitCovariance::about_object(seen.believed.center(), seen.believed.radius())?,
         mve,
@@ -144,14 +146,16 @@ fn total_loss(samples: &[Sample], model: &Calibration) -> f64 {
 
 /// Returns the loss of the differences between neighbors on a trajectory.
 ///
-/// The shared error cancels in these differences.
+/// The shared error cancels in these differences, which are those in the camera frame of the second
+/// one.
 fn scatter_loss(samples: &[Sample], model: &Calibration) -> f64 {
     let neighbors = samples
         .windows(2)
         .filter(|two| two[0].trajectory == two[1].trajectory);
     let each = neighbors.map(|two| {
-        let difference = two[1].error - two[0].error;
-        let covariance = own(model, &two[0]) + own(model, &two[1]);
+        let motion = se3::adjoint(&(two[1].truth * two[0].truth.inverse()));
+        let difference = two[1].error - motion * two[0].error;
+        let covariance = motion * own(model, &two[0]) * motion.transpose() + own(model, &two[1]);
         surprise(&difference, &covariance, model.degrees_of_freedom)
     });
     each.sum()

@@ -24,7 +24,7 @@ pub struct Calibration {
     pub mve_gain: f64,
     /// Exponent of its growth with the MVE.
     pub mve_power: f64,
-    /// Standard deviation if the registration determines no covariance.
+    /// Standard deviation if neither the registration nor a fit at its pose has a covariance.
     pub undetermined: f64,
     /// Standard deviation of the error that all estimates share: that of the model.
     pub shared: f64,

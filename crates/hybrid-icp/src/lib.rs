@@ -77,13 +77,16 @@ mod batch;
 mod calibration;
 pub mod checks;
 mod diagnosis;
+mod extent;
 mod preset;
 pub mod presets;
 mod refiner;
+mod registered;
 mod sequential;
 mod sequential_step;
 mod trace;
 mod tracker;
+mod undetermined;
 mod warning;
 
 pub use hicp_association as association;

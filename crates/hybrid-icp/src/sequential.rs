@@ -4,6 +4,7 @@ use hicp_core::{Isometry3, Matrix6, Model, Observation, Problem};
 use hicp_fusion::{
     BoxedFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
     Gated, IntoFuser, MveCovariance, PoseEstimate, SharedError, SymmetryAware, UnitCovariance,
+    Update,
 };
 use hicp_icp::{
     BoxedStage, Observer, Outcome, Quality, Session, Stage, Termination, Verdict, Workspace,
@@ -13,6 +14,7 @@ use hicp_score::{MeanVsd, Score};
 
 use crate::calibration::Calibration;
 use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs};
+use crate::undetermined::Undetermined;
 
 /// Estimates the pose of a static object from images along the path of a moving camera (§V).
 ///
@@ -53,6 +55,8 @@ pub struct SequentialEstimator {
     fuser: BoxedFuser,
     covariance: Box<Covariance>,
     score: Option<Box<dyn Score + Send>>,
+    /// The directions that no image determined, if covariances account for them.
+    undetermined: Option<Undetermined>,
     without_pairs: WithoutPairs,
     workspace: Workspace,
     /// The initial pose in the current camera frame.
@@ -81,6 +85,7 @@ impl SequentialEstimator {
             fuser: Box::new(fuser),
             covariance: Box::new(move |outcome, mve| of_model(&config.covariance, outcome, mve)),
             score: config.score.map(|score| Box::new(score) as _),
+            undetermined: None,
             without_pairs: config.without_pairs,
             workspace: Workspace::new(Rasterizer::default()),
             init: *init,
@@ -123,8 +128,13 @@ impl SequentialEstimator {
 
     /// Creates an estimator for an object from the calibrated 6×6 covariance of its registration.
     ///
-    /// It also uses the error that all estimates share, and a gate on the Mahalanobis distance.
-    /// Otherwise as [`SequentialEstimator::for_object`].
+    /// It also uses the error that all estimates share, and a gate on the Mahalanobis distance. A
+    /// direction that no image determines, for example the rotation of a mug whose handle is
+    /// hidden, has a deviation of the object's radius. Otherwise as
+    /// [`SequentialEstimator::for_object`].
+    ///
+    /// Cost of a step: one more fit that keeps the pose, and up to two scores for each direction of
+    /// little information.
     ///
     /// # Errors
     ///
@@ -141,7 +151,10 @@ impl SequentialEstimator {
         let gated = gated(fuser, unit, calibration.gate)?;
         let fuser = SharedError::new(gated, unit, calibration.shared)?;
         let covariance = CovarianceModel::Inflated(calibration.covariance(unit));
-        Self::of_object(stage, fuser, covariance, model, init)
+        Ok(Self {
+            undetermined: Some(Undetermined::new(model)),
+            ..Self::of_object(stage, fuser, covariance, model, init)?
+        })
     }
 
     fn of_object(
@@ -207,6 +220,7 @@ impl SequentialEstimator {
         covariance: impl Fn(&Outcome, Option<f64>) -> Matrix6<f64> + Send + 'static,
     ) -> Self {
         self.covariance = Box::new(covariance);
+        self.undetermined = None;
         self
     }
 
@@ -228,6 +242,9 @@ impl SequentialEstimator {
         // The checks of an estimate are those of an initial pose.
         self.init = *PoseEstimate::new(*init, Matrix6::zeros())?.camera_from_object();
         self.fuser.reset();
+        if let Some(undetermined) = &mut self.undetermined {
+            undetermined.clear();
+        }
         Ok(())
     }
 
@@ -246,12 +263,25 @@ impl SequentialEstimator {
     }
 
     /// Returns the fused estimate in the current camera frame, if there is one.
+    ///
+    /// Its covariance includes the directions that no image determines
+    /// ([`SequentialEstimator::calibrated`]).
     #[must_use]
     pub fn estimate(&self) -> Option<PoseEstimate> {
-        self.fuser.estimate()
+        let fused = self.fuser.estimate()?;
+        let Some(undetermined) = &self.undetermined else {
+            return Some(fused);
+        };
+        let pose = fused.camera_from_object();
+        let covariance = fused.covariance() + undetermined.of_fused(pose);
+        let stated = PoseEstimate::new(*pose, covariance).ok()?;
+        match fused.mve() {
+            Some(mve) => stated.with_mve(mve).ok(),
+            None => Some(stated),
+        }
     }
 
-    /// Returns the fuser.
+    /// Returns the fuser, which does not know the directions that no image determines.
     #[must_use]
     pub fn fuser(&self) -> &dyn Fuser {
         &*self.fuser
@@ -288,15 +318,27 @@ impl SequentialEstimator {
             &mut Session::new(&mut self.workspace, observer),
         );
         let (mve, event) = self.take(&problem, &outcome);
-        let fused = self.fuser.estimate();
         SequentialStep {
             camera_from_object: self.camera_from_object(),
-            covariance: fused.map(|fused| *fused.covariance()),
+            covariance: self.estimate().map(|fused| *fused.covariance()),
             init,
             outcome,
             mve,
             event,
         }
+    }
+
+    /// Passes an estimate to the fuser, and remembers the directions that it determines.
+    fn fuse(&mut self, estimate: &PoseEstimate) -> Update {
+        let update = self.fuser.update(estimate);
+        if let Some(undetermined) = &mut self.undetermined {
+            match update {
+                Update::Accepted(_) => undetermined.fuse(false),
+                Update::Restarted(..) => undetermined.fuse(true),
+                _ => {}
+            }
+        }
+        update
     }
 
     /// Scores the outcome of ICP and passes it to the fuser.
@@ -309,15 +351,27 @@ impl SequentialEstimator {
         }
         let pose = &outcome.camera_from_object;
         let workspace = &mut self.workspace;
-        let score = self.score.as_mut();
-        let mve = score.map(|score| score.score(&mut workspace.context(problem), pose));
-        let covariance = (self.covariance)(outcome, mve);
+        let mve = self
+            .score
+            .as_mut()
+            .map(|score| score.score(&mut workspace.context(problem), pose));
+        let mut outcome = *outcome;
+        let mut open = Matrix6::zeros();
+        if let (Some(undetermined), Some(score), Some(mve)) =
+            (&mut self.undetermined, &mut self.score, mve)
+        {
+            let quality = undetermined.see(problem, pose, mve, (&mut **score, workspace));
+            let known = outcome.quality.filter(|known| known.covariance().is_some());
+            outcome.quality = known.or(quality);
+            open = undetermined.of_latest(pose);
+        }
+        let covariance = (self.covariance)(&outcome, mve) + open;
         let estimate = PoseEstimate::new(*pose, covariance).and_then(|estimate| match mve {
             Some(mve) => estimate.with_mve(mve),
             None => Ok(estimate),
         });
         let event = match estimate {
-            Ok(estimate) => SequentialEvent::Estimated(self.fuser.update(&estimate)),
+            Ok(estimate) => SequentialEvent::Estimated(self.fuse(&estimate)),
             Err(error) => SequentialEvent::Refused(error),
         };
         (mve, event)

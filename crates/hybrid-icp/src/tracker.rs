@@ -1,6 +1,5 @@
 //! Tracking of a moving object from image to image.
 
-mod extent;
 mod finder;
 mod found;
 mod matcher;
@@ -168,7 +167,7 @@ impl Tracker {
         }
         let diameter = self.matcher.extent.diameter;
         let (lost, mut found) = (self.state == TrackState::Lost, None);
-        let near = self.matcher.extent.deviation(&motion) < NEAR_DIAMETERS * diameter;
+        let near = motion.deviation(&self.matcher.extent) < NEAR_DIAMETERS * diameter;
         if near || !lost {
             found = self.matcher.follow(depth, mask, &motion)?;
             // Far away, another surface may look like the object.
@@ -191,7 +190,7 @@ impl Tracker {
             }
             self.ambiguous = ambiguous;
         }
-        let unsure = self.matcher.extent.deviation(&motion) > 2.0 * SURE_DIAMETERS * diameter;
+        let unsure = motion.deviation(&self.matcher.extent) > 2.0 * SURE_DIAMETERS * diameter;
         // Another surface rarely looks like the object in two images.
         let mut confirmed = match &mut self.trial {
             Some(trial) => {
@@ -229,7 +228,7 @@ impl Tracker {
         } else {
             self.unseen + seconds
         };
-        let deviation = self.matcher.extent.deviation(&motion);
+        let deviation = motion.deviation(&self.matcher.extent);
         let is_sure = |f: Found| f.is_sure() && deviation < SURE_DIAMETERS * diameter;
         self.state = match seen {
             Some(found) if is_sure(found) && confirmed && !self.ambiguous => TrackState::Tracking,
@@ -255,7 +254,7 @@ impl Tracker {
             camera_from_object: *motion.pose(),
             state: self.state,
             evidence: seen.or(found).map(|f| f.evidence).unwrap_or_default(),
-            deviation_meters: self.matcher.extent.deviation(&motion),
+            deviation_meters: motion.deviation(&self.matcher.extent),
         })
     }
 

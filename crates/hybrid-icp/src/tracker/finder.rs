@@ -8,11 +8,11 @@ use hicp_core::{
     UnitQuaternion, Vector3,
 };
 
-use super::extent::DIFFERENT_DIAMETERS;
 use super::found::Found;
 use super::matcher::{Matcher, ROUGH_ITERATIONS, run};
 use super::motion::Motion;
 use super::segments::{Segment, Segments, Sphere};
+use crate::extent::DIFFERENT_DIAMETERS;
 
 /// Difference in merit by which a pose is clearly better than another one.
 pub(super) const CLEARLY: f64 = 0.03;
@@ -172,7 +172,7 @@ impl Matcher {
     /// Returns the logarithm of the probability of one of several similar poses, up to a constant.
     fn odds(&self, found: &Found, motion: Option<&Motion>) -> f64 {
         let away = motion.map_or(0.0, |motion| {
-            self.extent.distance(&found.pose, motion.pose()) / self.extent.deviation(motion)
+            self.extent.distance(&found.pose, motion.pose()) / motion.deviation(&self.extent)
         });
         -CLEAR_ODDS / CLEAR_MVE * found.mve - 0.5 * away * away
     }

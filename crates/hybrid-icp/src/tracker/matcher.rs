@@ -13,15 +13,18 @@ use hicp_icp::{
 use hicp_raster::Rasterizer;
 use hicp_score::{Confidence, MeanVsd, SampledMve, Score};
 
-use super::extent::{DIFFERENT_DIAMETERS, Extent};
 use super::found::{Found, measured_noise};
-use super::motion::{Motion, Registered, moved};
+use super::motion::Motion;
 use super::region::Widening;
 use super::rejections::Rejections;
+use crate::extent::{DIFFERENT_DIAMETERS, Extent};
 use crate::presets::{Far, Fit, Search, far, fit, look_alikes, search_with};
+use crate::registered::Registered;
 
 /// Factor on the deviations of a registration, whose errors are correlated.
 const INFLATION: f64 = 2.0;
+/// Factor on the deviation of an unknown direction that makes it no information at all.
+const NOTHING: f64 = 1e3;
 /// Numbers of points of a registration, and of lines across the silhouette.
 const POINTS: usize = 1000;
 const LINES: usize = 80;
@@ -32,10 +35,6 @@ pub(super) const ROUGH_ITERATIONS: usize = 8;
 const ROUGH_DIAMETERS: f64 = 0.05;
 /// Standard deviation of the depth noise before it is measured, in diameters.
 const START_NOISE: f64 = 0.02;
-/// Rise of the score up to which an image does not contradict a move.
-const SAME_SCORE: f64 = 0.03;
-/// Factor on the deviation of an unknown direction that makes it no information at all.
-const NOTHING: f64 = 1e3;
 /// Distance from the prediction, beyond four standard deviations, that is a jump, in radii.
 const JUMP_RADII: f64 = 0.35;
 
@@ -87,7 +86,7 @@ impl Matcher {
         motion: &Motion,
     ) -> Result<Option<(Found, Matrix6<f64>)>, ImageError> {
         let diameter = self.extent.diameter;
-        let deviation = self.extent.deviation(motion);
+        let deviation = motion.deviation(&self.extent);
         let meters = (3.0 * deviation + 0.03 * diameter).min(0.3 * diameter);
         let observation = self.observe(depth, mask, motion.pose(), meters)?;
         let reach = JUMP_RADII * self.extent.radius + 4.0 * deviation;
@@ -213,9 +212,7 @@ impl Matcher {
 
     /// Returns the covariance of a registered pose around the object's center.
     ///
-    /// A direction of little information is unknown if the image does not contradict a move by a
-    /// tenth of the diameter in it, because facets of a mesh and noise have some in each one.
-    /// An example is the rotation of a mug whose handle is hidden.
+    /// Open directions are unknown ([`Registered::forget_open`]).
     ///
     /// `deviation` is that of the prediction, meters. If it is large, the variance of an unknown
     /// direction bounds it. Otherwise the variance is so large that images without information do
@@ -227,7 +224,6 @@ impl Matcher {
         deviation: f64,
     ) -> Matrix6<f64> {
         let radius = self.extent.radius;
-        let center = found.pose * self.model.center();
         let (scale, information) = match found.quality {
             Some(quality) => (
                 (INFLATION * quality.plane_rmse).powi(2),
@@ -235,29 +231,18 @@ impl Matcher {
             ),
             None => (1.0, Matrix6::zeros()),
         };
-        let displacement = self.extent.displacement(&found.pose);
-        let mut registered = Registered::new(&information, &center, &displacement);
-        let weak = (0..6).filter_map(|direction| Some((direction, registered.weak(direction)?)));
-        let weak: Vec<_> = weak.collect();
-        let meters = DIFFERENT_DIAMETERS * self.extent.diameter;
-        let mut unknown = [radius, 1.0];
-        if !weak.is_empty() {
-            let problem = Problem::new(&self.model, observation);
-            let mut context = self.workspace.context(&problem);
-            let center = self.model.center();
-            for (direction, step) in weak {
-                let mut is_good = |meters: f64| {
-                    let away = moved(&found.pose, &center, &(step * meters));
-                    MeanVsd::default().score(&mut context, &away) < found.mve + SAME_SCORE
-                };
-                if is_good(meters) || is_good(-meters) {
-                    registered.forget(direction);
-                    if deviation < meters {
-                        unknown = [radius, 1.0].map(|x| NOTHING * x);
-                    }
-                }
-            }
-        }
+        let mut registered = Registered::new(&information, &self.extent, &found.pose);
+        let problem = Problem::new(&self.model, observation);
+        let workspace = &mut self.workspace;
+        let mut score = |pose: &_| MeanVsd::default().score(&mut workspace.context(&problem), pose);
+        let open = registered.forget_open(&self.extent, &found.pose, found.mve, &mut score);
+        let certain = deviation < DIFFERENT_DIAMETERS * self.extent.diameter;
+        let factor = if certain && !open.is_empty() {
+            NOTHING
+        } else {
+            1.0
+        };
+        let unknown = [radius, 1.0].map(|x| factor * x);
         registered.covariance(scale.max(1e-8), [0.005 * radius, 0.005], unknown)
     }
 }

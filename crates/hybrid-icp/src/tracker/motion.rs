@@ -1,15 +1,14 @@
 //! The motion of an object: a filter that predicts its pose and knows how uncertain it is.
 
-use hicp_core::internal::small::{blocks, eigen6, inverse6, join};
-use hicp_core::nalgebra::{Const, SymmetricEigen};
-use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6, so3};
+use hicp_core::internal::small::{blocks, inverse6};
+use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Vector6, so3};
+
+use crate::extent::{Extent, difference, moved, squares};
 
 /// Largest speed (m/s and rad/s) and time constant (seconds).
 const MAX: f64 = 1e3;
 /// Smallest time constant, seconds.
 const MIN_SECONDS: f64 = 1e-3;
-/// Information of a direction, relative to the best determined one, that is little.
-const WEAK: f64 = 0.01;
 /// Largest distance of the pose from a measured one, in standard deviations of the measurement.
 const MAX_DEVIATIONS: f64 = 4.0;
 
@@ -79,6 +78,11 @@ impl Motion {
         &self.of_pose
     }
 
+    /// Returns the standard deviation of the least determined displacement of an object, meters.
+    pub(super) fn deviation(&self, extent: &Extent) -> f64 {
+        extent.deviation(&self.pose, &self.of_pose)
+    }
+
     /// Moves the pose by a time in seconds.
     pub(super) fn predict(&mut self, seconds: f64) {
         let share = seconds / self.memory;
@@ -134,81 +138,6 @@ impl Motion {
     }
 }
 
-/// The information of a registration, around the object's center.
-pub(super) struct Registered {
-    /// Information in displacements of the surface, by direction.
-    eigen: SymmetricEigen<f64, Const<6>>,
-    /// The map from a displacement of the pose to one of the surface, and its inverse.
-    displacement: Matrix6<f64>,
-    unit: Matrix6<f64>,
-}
-
-impl Registered {
-    /// Changes the information of a registration to the object's center.
-    ///
-    /// `information` is for the twist around the camera's origin, and `displacement` the map from
-    /// one around the center to the displacement of the surface.
-    pub(super) fn new(
-        information: &Matrix6<f64>,
-        center: &Point3<f64>,
-        displacement: &Matrix6<f64>,
-    ) -> Self {
-        let mut change = Matrix6::identity();
-        let arm: Matrix3<f64> = so3::hat(&center.coords);
-        change.fixed_view_mut::<3, 3>(0, 3).copy_from(&arm);
-        let unit = inverse6(displacement).unwrap_or_else(Matrix6::identity);
-        let change = change * unit;
-        let none = SymmetricEigen {
-            eigenvectors: Matrix6::identity(),
-            eigenvalues: Vector6::zeros(),
-        };
-        Self {
-            eigen: eigen6(&(change.transpose() * information * change)).unwrap_or(none),
-            displacement: *displacement,
-            unit,
-        }
-    }
-
-    /// Returns a direction of little information, as the displacement of the pose that moves the
-    /// surface by 1 m.
-    pub(super) fn weak(&self, direction: usize) -> Option<Vector6<f64>> {
-        let values = &self.eigen.eigenvalues;
-        let is_weak = values[direction] < WEAK * values.max();
-        is_weak.then(|| self.unit * self.eigen.eigenvectors.column(direction))
-    }
-
-    /// Counts a direction as unknown.
-    pub(super) fn forget(&mut self, direction: usize) {
-        self.eigen.eigenvalues[direction] = 0.0;
-    }
-
-    /// Returns the covariance of the pose.
-    ///
-    /// Directions without information get a large one. `scale` is the variance of a residual, and
-    /// `floor` is added.
-    pub(super) fn covariance(self, scale: f64, floor: [f64; 2], unknown: [f64; 2]) -> Matrix6<f64> {
-        let prior = Matrix6::from_diagonal(&squares(unknown).map(|x| 1.0 / x));
-        let information = self.eigen.recompose() / scale;
-        let information = self.displacement.transpose() * information * self.displacement + prior;
-        let floor = Matrix6::from_diagonal(&squares(floor));
-        let covariance = inverse6(&information);
-        covariance.unwrap_or_else(|| Matrix6::from_diagonal(&squares(unknown))) + floor
-    }
-}
-
-/// Moves the object's center by a displacement, and rotates the object around it.
-pub(super) fn moved(
-    pose: &Isometry3<f64>,
-    center: &Point3<f64>,
-    step: &Vector6<f64>,
-) -> Isometry3<f64> {
-    let at = pose * center + step.fixed_rows::<3>(0);
-    let mut rotation = so3::exp(&step.fixed_rows::<3>(3).into_owned()) * pose.rotation;
-    rotation.renormalize();
-    let shift = at - rotation * center;
-    Isometry3::from_parts(Translation3::from(shift), rotation)
-}
-
 /// Returns the map from uncertain displacements before a rotation to those after it.
 ///
 /// Those of the center stay.
@@ -217,26 +146,10 @@ fn rotation(step: &Vector6<f64>) -> Matrix6<f64> {
     blocks(&Matrix3::identity(), &Matrix3::zeros(), turn.matrix())
 }
 
-/// Returns the displacement from pose `b` to pose `a` around an object's center.
-pub(super) fn difference(
-    a: &Isometry3<f64>,
-    b: &Isometry3<f64>,
-    center: &Point3<f64>,
-) -> Vector6<f64> {
-    let turn = so3::log(&(a.rotation * b.rotation.inverse()));
-    join(&(a * center - b * center), &turn)
-}
-
-fn squares([translation, rotation]: [f64; 2]) -> Vector6<f64> {
-    join(
-        &Vector3::repeat(translation * translation),
-        &Vector3::repeat(rotation * rotation),
-    )
-}
-
 #[cfg(test)]
 mod tests {
-    use hicp_core::UnitQuaternion;
+    use hicp_core::internal::small::join;
+    use hicp_core::{Translation3, UnitQuaternion, Vector3};
 
     use super::*;
 
@@ -283,29 +196,6 @@ mod tests {
         assert!((once.of_pose - often.of_pose).norm() < 1e-9);
         assert!((once.of_velocity - often.of_velocity).norm() < 1e-9);
         assert!(once.of_pose.trace() > before);
-    }
-
-    #[test]
-    fn directions_without_information_stay_uncertain() {
-        let mut motion = motion();
-        let at = motion.center();
-        // Rows of a plane z = const: x, y and the rotation around z are not determined.
-        let mut information = Matrix6::zeros();
-        for (x, y) in [(-0.1, -0.1), (0.1, -0.1), (0.0, 0.1), (0.1, 0.1)] {
-            let point = at.coords + Vector3::new(x, y, 0.0);
-            let row = join(&Vector3::z(), &point.cross(&Vector3::z()));
-            information += row * row.transpose();
-        }
-        let displacement = Matrix6::from_diagonal(&join(&Vector3::repeat(1.0), &[0.1; 3].into()));
-        let registered = Registered::new(&information, &at, &displacement);
-        let covariance = registered.covariance(1e-6, [0.0; 2], [0.1, 1.0]);
-        let pose = *motion.pose();
-        motion.update(&pose, &covariance);
-        let deviations = motion.covariance().diagonal().map(f64::sqrt);
-        for determined in [2, 3, 4] {
-            assert!(deviations[determined] < 0.01, "{deviations}");
-        }
-        assert!(deviations[0] > 0.019 && deviations[1] > 0.019 && deviations[5] > 0.19);
     }
 
     /// An example is the axis of a mug whose handle is hidden.

@@ -1,20 +1,20 @@
 //! Sizes of displacements of an object.
 
-use hicp_core::internal::small::{eigen3, eigen6};
-use hicp_core::{Isometry3, Matrix3, Matrix6, Model, Point3, UnitVector3, Vector3};
+use hicp_core::internal::small::{eigen3, eigen6, join};
+use hicp_core::{
+    Isometry3, Matrix3, Matrix6, Model, Point3, Translation3, UnitVector3, Vector3, Vector6, so3,
+};
 use hicp_score::mssd;
 
-use super::motion::{Motion, difference};
-
 /// Distance between two poses that are different, in diameters.
-pub(super) const DIFFERENT_DIAMETERS: f64 = 0.1;
+pub(crate) const DIFFERENT_DIAMETERS: f64 = 0.1;
 
 /// The sizes and symmetries of an object that tell how far two poses are apart.
 #[derive(Clone, Debug)]
-pub(super) struct Extent {
-    pub(super) center: Point3<f64>,
-    pub(super) radius: f64,
-    pub(super) diameter: f64,
+pub(crate) struct Extent {
+    pub(crate) center: Point3<f64>,
+    pub(crate) radius: f64,
+    pub(crate) diameter: f64,
     /// The map from a rotation vector to the displacement of the surface, object frame, meters per
     /// radian.
     levers: Matrix3<f64>,
@@ -25,7 +25,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    pub(super) fn new(model: &Model) -> Self {
+    pub(crate) fn new(model: &Model) -> Self {
         let axes = model.symmetries().continuous.iter();
         Self {
             center: model.center(),
@@ -39,26 +39,27 @@ impl Extent {
     }
 
     /// Returns whether two poses are more than a tenth of the diameter apart, up to symmetry.
-    pub(super) fn differ(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    pub(crate) fn differ(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
         mssd(a, b, &self.points, &self.symmetries) > DIFFERENT_DIAMETERS * self.diameter
     }
 
     /// Returns the standard deviation of the least determined displacement, meters.
     ///
-    /// Rotations around declared axes of symmetry do not count.
-    pub(super) fn deviation(&self, motion: &Motion) -> f64 {
-        let scale = self.scale(motion.pose());
-        let covariance = scale * motion.covariance() * scale.transpose();
+    /// `covariance` is that of a displacement of the pose. Rotations around declared axes of
+    /// symmetry do not count.
+    pub(crate) fn deviation(&self, pose: &Isometry3<f64>, covariance: &Matrix6<f64>) -> f64 {
+        let scale = self.scale(pose);
+        let covariance = scale * covariance * scale.transpose();
         eigen6(&covariance).map_or(0.0, |eigen| eigen.eigenvalues.max().max(0.0).sqrt())
     }
 
     /// Returns the distance between two poses in the same sense, meters.
-    pub(super) fn distance(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+    pub(crate) fn distance(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
         (self.scale(b) * difference(a, b, &self.center)).norm()
     }
 
     /// Returns the map from a displacement of a pose (meters, radians) to one of the surface.
-    pub(super) fn displacement(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
+    pub(crate) fn displacement(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
         let rotation = pose.rotation.to_rotation_matrix().into_inner();
         let mut scale = Matrix6::identity();
         let levers = rotation * self.levers * rotation.transpose();
@@ -77,6 +78,37 @@ impl Extent {
         }
         scale
     }
+}
+
+/// Moves the object's center by a displacement, and rotates the object around it.
+pub(crate) fn moved(
+    pose: &Isometry3<f64>,
+    center: &Point3<f64>,
+    step: &Vector6<f64>,
+) -> Isometry3<f64> {
+    let at = pose * center + step.fixed_rows::<3>(0);
+    let mut rotation = so3::exp(&step.fixed_rows::<3>(3).into_owned()) * pose.rotation;
+    rotation.renormalize();
+    let shift = at - rotation * center;
+    Isometry3::from_parts(Translation3::from(shift), rotation)
+}
+
+/// Returns the displacement from pose `b` to pose `a` around an object's center.
+pub(crate) fn difference(
+    a: &Isometry3<f64>,
+    b: &Isometry3<f64>,
+    center: &Point3<f64>,
+) -> Vector6<f64> {
+    let turn = so3::log(&(a.rotation * b.rotation.inverse()));
+    join(&(a * center - b * center), &turn)
+}
+
+/// Returns the squares of three translations and three rotations.
+pub(crate) fn squares([translation, rotation]: [f64; 2]) -> Vector6<f64> {
+    join(
+        &Vector3::repeat(translation * translation),
+        &Vector3::repeat(rotation * rotation),
+    )
 }
 
 /// Returns the map from a rotation vector to the largest displacement of the surface.
@@ -99,7 +131,7 @@ fn levers(model: &Model) -> Matrix3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use hicp_core::{Translation3, UnitQuaternion};
+    use hicp_core::UnitQuaternion;
     use hicp_sim::Household;
 
     use super::*;
