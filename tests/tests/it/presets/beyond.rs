@@ -22,7 +22,7 @@ use hybrid_icp::icp::{
 use hybrid_icp::pipeline::PipelineFile;
 use hybrid_icp::raster::Rasterizer;
 use hybrid_icp::score::{MeanVsd, SampledMve, Score, add, mssd};
-use hybrid_icp::{Preset, Refiner, Warning, presets};
+use hybrid_icp::{Preset, Refinement, Refiner, Warning, presets};
 use proptest::prelude::*;
 
 /// Returns the MVE that the presets decide by.
@@ -305,14 +305,26 @@ fn poses_that_look_the_same_are_ambiguous_unless_declared() {
     let scene = scene(Household::Plate, 0.3, &mut rng(5));
     let undeclared = Model::new(scene.model.mesh().clone());
     let init = perturb(&mut rng(6), &scene.truth, 0.004, 0.07);
-    let ambiguous = |preset: Preset, model: &Model| {
-        let mut refiner = Refiner::preset(preset);
-        let refined = refiner.refine(model, &scene.observation, &init);
+    let listed = |refiner: &Refiner, refined: &Refinement, model: &Model| {
         assert_eq!(refined.runner_up, refiner.alternatives().first().copied());
+        let pose = &refined.outcome.camera_from_object;
         for other in refiner.alternatives() {
+            let (angle, _) = se3::pose_distance(&other.camera_from_object, pose);
+            assert!(
+                (angle.to_degrees() - other.rotation_degrees).abs() < 1e-6,
+                "{other:?}"
+            );
             assert!(other.mssd_meters > 0.1 * model.diameter());
             assert!(other.gap > -0.02 && other.score.is_finite());
         }
+    };
+    let ambiguous = |preset: Preset, model: &Model| {
+        let mut refiner = Refiner::preset(preset);
+        // A search in a search: the poses listed are those of the outer one.
+        let refined = refiner.estimate(model, &scene.observation);
+        listed(&refiner, &refined, model);
+        let refined = refiner.refine(model, &scene.observation, &init);
+        listed(&refiner, &refined, model);
         let warned = |w: &Warning| matches!(w, Warning::Ambiguous { gap, .. } if *gap < 0.01);
         refined.warnings().iter().any(warned)
     };
