@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::cloud::Cloud;
 use crate::derived::Derived;
+use crate::object::mesh::TriMesh;
 use crate::object::model::Model;
 use crate::render::{RenderCache, RenderedView};
 use crate::sensor::observation::Observation;
@@ -199,6 +200,22 @@ impl<'a> Problem<'a> {
         Some((self.model()?, self.observation()?))
     }
 
+    /// Returns the mesh that is rendered, if there is one.
+    ///
+    /// It is that of [`Model::drawn`]. If the image has colors, it is a mesh that has some.
+    #[must_use]
+    #[inline]
+    pub fn drawn(&self) -> Option<&'a TriMesh> {
+        let model = self.model()?;
+        let colored = self
+            .observation()
+            .is_some_and(|seen| seen.color().is_some());
+        if colored && model.mesh().color().is_some() {
+            return Some(model.mesh());
+        }
+        Some(model.drawn())
+    }
+
     /// Returns `part` if the target is a cloud, for components that need a depth image.
     #[must_use]
     pub fn without_image(&self, part: &'static str) -> Option<&'static str> {
@@ -293,11 +310,15 @@ impl<'a> Context<'a> {
 
     /// Returns the model rendered at a pose, `camera_from_object`, in the observation's camera.
     ///
-    /// Its triangles are those of [`Model::drawn`]. If the cache holds the pose, nothing is
+    /// Its triangles are those of [`Problem::drawn`]. If the cache holds the pose, nothing is
     /// rendered. Returns `None` if the problem has no model or no depth image.
     pub fn view(&mut self, camera_from_object: &Isometry3<f64>) -> Option<&RenderedView> {
         let (model, observation) = self.problem.sides()?;
         let camera = observation.camera();
-        Some(self.renders.view(model, camera, camera_from_object))
+        let mesh = self.problem.drawn()?;
+        Some(
+            self.renders
+                .view_of(model, mesh, camera, camera_from_object),
+        )
     }
 }

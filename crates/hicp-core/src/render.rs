@@ -256,6 +256,8 @@ struct Entry {
 #[derive(Clone, Copy, PartialEq)]
 struct Key {
     model: Id,
+    /// `true` if the mesh is simplified.
+    simplified: bool,
     camera: PinholeCamera,
     pose: [u64; 7],
 }
@@ -282,8 +284,20 @@ impl RenderCache {
         camera: &PinholeCamera,
         camera_from_object: &Isometry3<f64>,
     ) -> &RenderedView {
+        self.view_of(model, model.drawn(), camera, camera_from_object)
+    }
+
+    /// Returns the same with the triangles of one of the meshes of the model.
+    pub(crate) fn view_of(
+        &mut self,
+        model: &Model,
+        mesh: &TriMesh,
+        camera: &PinholeCamera,
+        camera_from_object: &Isometry3<f64>,
+    ) -> &RenderedView {
         let key = Key {
             model: model.id(),
+            simplified: !std::ptr::eq(mesh, model.mesh()),
             camera: *camera,
             pose: pose_bits(camera_from_object),
         };
@@ -297,13 +311,9 @@ impl RenderCache {
             // reused.
             self.entries[chosen].key = None;
             let view = &mut self.entries[chosen].view;
-            self.renderer.render(
-                model.drawn(),
-                camera,
-                camera_from_object,
-                &camera.region(),
-                view,
-            );
+            let region = camera.region();
+            self.renderer
+                .render(mesh, camera, camera_from_object, &region, view);
             // All views grow together, so that allocations of a warm run do not depend on the
             // reused entry.
             let (capacity, area) = (view.depth.capacity(), view.depth.len());

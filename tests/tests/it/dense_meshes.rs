@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use hicp_sim::Household;
 use hybrid_icp::core::{
-    Isometry3, Model, ModelConfig, PinholeCamera, Point3, RenderedView, Renderer, SurfaceColor,
-    TriMesh, UnitQuaternion, Vector3,
+    ColorImage, DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera,
+    Point3, Problem, RenderedView, Renderer, SurfaceColor, TriMesh, UnitQuaternion, Vector3,
 };
 use hybrid_icp::raster::Rasterizer;
 
@@ -87,13 +87,22 @@ fn a_render_of_the_simplified_mesh_hardly_differs() {
 }
 
 #[test]
-fn a_mesh_is_rendered_as_it_is_if_it_is_small_or_has_colors_or_should_be() {
+fn a_mesh_is_rendered_as_it_is_if_it_is_small_or_should_be_or_colors_are_compared() {
     let small = Household::Mug.model().unwrap();
     assert!(std::ptr::eq(small.drawn(), small.mesh()));
     let dense = subdivided(small.mesh());
     let gray = SurfaceColor::Vertices(vec![[90; 3]; dense.vertices().len()]);
     let colored = Model::new(dense.clone().with_color(gray).unwrap());
-    assert!(std::ptr::eq(colored.drawn(), colored.mesh()));
+    assert!(!std::ptr::eq(colored.drawn(), colored.mesh()));
+    let depth = DepthImage::from_meters(4, 4, vec![1.0; 16]).unwrap();
+    let camera = PinholeCamera::new(4.0, 4.0, 1.5, 1.5, 4, 4).unwrap();
+    let observation = Observation::new(depth.clone(), Mask::measured(&depth), camera).unwrap();
+    let image = ColorImage::new(4, 4, vec![[90; 3]; 16]).unwrap();
+    let with_color = observation.clone().with_color(image).unwrap();
+    for (observation, compared) in [(&observation, false), (&with_color, true)] {
+        let drawn = Problem::new(&colored, observation).drawn().unwrap();
+        assert_eq!(std::ptr::eq(drawn, colored.mesh()), compared);
+    }
     let config = ModelConfig {
         simplify_above: usize::MAX,
         ..ModelConfig::default()

@@ -60,9 +60,11 @@ impl DataAssociation for RenderedSurface {
     ) {
         pairs.set_candidates(0);
         let problem = context.problem;
-        let (Some((model, observation)), Some(view)) =
-            (problem.sides(), context.view(camera_from_object))
-        else {
+        let (Some(mesh), Some(observation), Some(view)) = (
+            problem.drawn(),
+            problem.observation(),
+            context.view(camera_from_object),
+        ) else {
             return;
         };
         if !observation.has_surface() {
@@ -76,8 +78,7 @@ impl DataAssociation for RenderedSurface {
         for v in (region.v_min.next_multiple_of(stride)..region.v_max).step_by(stride as usize) {
             for u in (region.u_min.next_multiple_of(stride)..region.u_max).step_by(stride as usize)
             {
-                let Some(source) = view.surfel_at(u, v, model.drawn(), camera, camera_from_object)
-                else {
+                let Some(source) = view.surfel_at(u, v, mesh, camera, camera_from_object) else {
                     continue;
                 };
                 candidates += 1;

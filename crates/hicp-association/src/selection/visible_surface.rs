@@ -72,12 +72,14 @@ impl PointSelection for VisibleSurface {
             (SelectAt::Cascade, Some(init)) => *init,
             _ => *camera_from_object,
         };
-        let (Some((model, observation)), Some(view)) =
-            (problem.sides(), context.view(camera_from_object))
-        else {
+        let (Some(mesh), Some(observation), Some(view)) = (
+            problem.drawn(),
+            problem.observation(),
+            context.view(camera_from_object),
+        ) else {
             return;
         };
-        let (mesh, camera) = (model.drawn(), observation.camera());
+        let camera = observation.camera();
         let region = view.region();
         let rendered = view.n_rendered();
         if rendered == 0 {

@@ -43,9 +43,9 @@ impl Default for ModelConfig {
             samples: 1000,
             diameter: None,
             symmetries: Symmetries::default(),
-            // Deviation: dense meshes: §III-A renders the model. If it has more triangles than this
-            // and no colors, a simplified mesh is rendered, because the time of a render is
-            // proportional to its triangles.
+            // Deviation: dense meshes: §III-A renders the model. If it has more triangles than
+            // this, and is not compared with a color image, a simplified mesh is rendered, because
+            // the time of a render is proportional to its triangles.
             simplify_above: 20_000,
         }
     }
@@ -118,16 +118,17 @@ impl Model {
         &self.mesh
     }
 
-    /// The mesh that is rendered: the mesh itself, or a simplified one if it has no colors and more
+    /// The mesh that is rendered: the mesh itself, or a simplified one if it has more triangles
     /// than [`ModelConfig::simplify_above`].
     ///
-    /// A simplified mesh has about 12,000 triangles. Most of its surface is within a thousandth of
-    /// the diameter of the mesh. The first call computes it, in some 30 ms for 100,000 triangles.
+    /// A simplified mesh has about 12,000 triangles, and no colors. For color images, see
+    /// [`Problem::drawn`](crate::Problem::drawn). Most of its surface is within a thousandth of the
+    /// diameter of the mesh. The first call computes it, in some 30 ms for 100,000 triangles.
     #[must_use]
     pub fn drawn(&self) -> &TriMesh {
         let simplify = || {
             let dense = self.mesh.triangles().len() > self.simplify_above;
-            (dense && self.mesh.color().is_none()).then(|| simplified(&self.mesh))?
+            dense.then(|| simplified(&self.mesh))?
         };
         let simplified = self.simplified.get_or_init(simplify);
         simplified.as_ref().unwrap_or(&self.mesh)

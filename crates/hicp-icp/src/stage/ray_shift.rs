@@ -39,7 +39,10 @@ impl Stage for RayShift {
         };
         for _ in 0..PASSES {
             let pose = outcome.camera_from_object;
-            let view = (session.workspace).view(model, observation.camera(), &pose);
+            let mut context = session.workspace.context(problem);
+            let Some(view) = context.view(&pose) else {
+                break;
+            };
             let region = view.region().intersection(&observation.region());
             let (depth, mask) = (observation.depth(), observation.mask());
             self.differences.clear();

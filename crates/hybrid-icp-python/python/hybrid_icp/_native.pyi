@@ -307,7 +307,7 @@ class Model:
         Coordinates in the object frame, in `unit`. They are stored as float32 meters.
     faces : array_like of int, shape (F, 3)
         Indices of the triangle corners, counter-clockwise seen from outside. Of more than 20,000
-        faces without colors, about 12,000 are rendered.
+        faces, about 12,000 are rendered, unless their colors are compared with an image.
     unit : {"m", "mm", "cm"}, optional
         Unit of the vertices, of `diameter`, and of the offsets and translations of the symmetries.
     samples : int, optional
