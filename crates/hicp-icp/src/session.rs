@@ -86,6 +86,8 @@ pub struct Session<'a> {
     /// The initial pose of the cascade that is running, `camera_from_object`. A cascade sets it for
     /// its stages.
     pub cascade_init: Option<Isometry3<f64>>,
+    /// `true` within a search, whose stages only refine.
+    pub(crate) searching: bool,
 }
 
 impl<'a> Session<'a> {
@@ -95,6 +97,7 @@ impl<'a> Session<'a> {
             workspace,
             observer,
             cascade_init: None,
+            searching: false,
         }
     }
 

@@ -244,7 +244,7 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             alternative.gap = alternative.score - chosen.score;
             alternative.mssd_meters = distinct.mssd(other, pose);
             alternative.rotation_degrees = distinct.degrees(other, pose);
-            if alternative.is_ambiguous() && self.agrees(&chosen.color) {
+            if alternative.gap < self.tolerance && self.agrees(&chosen.color) {
                 let known = tried
                     .iter()
                     .find(|tried| tried.outcome.camera_from_object == *other);
@@ -298,7 +298,9 @@ impl<S: Stage, P: Stage, C: Score> Stage for ColorChoice<S, P, C> {
         let Some((model, _)) = problem.sides().filter(colored) else {
             return outcome;
         };
-        if outcome.termination == Termination::Stopped || !se3::is_finite(init) {
+        // In a search, other poses are refined, too, and the choice follows.
+        let early = session.searching || outcome.termination == Termination::Stopped;
+        if early || !se3::is_finite(init) {
             return outcome;
         }
         let distinct = Distinct::of(model);

@@ -46,6 +46,8 @@ use crate::stage::stage_trait::Stage;
 /// is returned: the rotation of a can is often known from elsewhere. The others are in
 /// [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
+/// Within another search, it only runs its local stage.
+///
 /// The observer receives every refined pose as a decision: it is kept if it joins the list of poses
 /// found. The pose that replaces the local one is the last decision.
 ///
@@ -365,29 +367,9 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
             self.add(run, start.outcome.then(next), Progress::Refined);
         }
     }
-}
 
-/// Number of best ranked hypotheses that are aligned before the best of them is tried.
-const FIRST: usize = 32;
-/// Product of doubt and score above which even a confident pose is not good enough: a score of .04.
-const UNEXPLAINED: f64 = 0.002;
-/// Product of doubt and score above which the search of a part of the hypotheses has failed.
-const FAILED: f64 = 0.02;
-/// Number of distinct poses that are fitted, even if one is good enough.
-const FINALISTS: usize = 2;
-/// Largest gap in score between them and the best one.
-const FINAL_GAP: f64 = 0.1;
-/// Number of refined hypotheses per pose that the local stage refines at the end.
-const REFINED: usize = 6;
-/// Largest gap in cost between them and the best one.
-const REFINED_GAP: f64 = 0.04;
-/// Gap in score that errors of the sensor and the model can explain.
-const UNDECIDED: f64 = 0.02;
-
-impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
-    for HypothesisSearch<S, A, E, F, R, C, D>
-{
-    fn run(
+    /// Refines the initial pose, and searches for a better one.
+    fn find(
         &mut self,
         problem: &Problem<'_>,
         init: &Isometry3<f64>,
@@ -472,6 +454,43 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
             iterations: run.iterations,
             ..returned
         }
+    }
+}
+
+/// Number of best ranked hypotheses that are aligned before the best of them is tried.
+const FIRST: usize = 32;
+/// Product of doubt and score above which even a confident pose is not good enough: a score of .04.
+const UNEXPLAINED: f64 = 0.002;
+/// Product of doubt and score above which the search of a part of the hypotheses has failed.
+const FAILED: f64 = 0.02;
+/// Number of distinct poses that are fitted, even if one is good enough.
+const FINALISTS: usize = 2;
+/// Largest gap in score between them and the best one.
+const FINAL_GAP: f64 = 0.1;
+/// Number of refined hypotheses per pose that the local stage refines at the end.
+const REFINED: usize = 6;
+/// Largest gap in cost between them and the best one.
+const REFINED_GAP: f64 = 0.04;
+/// Gap in score that errors of the sensor and the model can explain.
+const UNDECIDED: f64 = 0.02;
+
+impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score> Stage
+    for HypothesisSearch<S, A, E, F, R, C, D>
+{
+    fn run(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        session: &mut Session<'_>,
+    ) -> Outcome {
+        // The outer search finds the poses, and this one only refines them.
+        if session.searching {
+            return self.stage.run(problem, init, session);
+        }
+        session.searching = true;
+        let outcome = self.find(problem, init, session);
+        session.searching = false;
+        outcome
     }
 
     fn time_limit(&self) -> Option<Duration> {
