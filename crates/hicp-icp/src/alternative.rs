@@ -22,7 +22,7 @@ pub struct Alternative {
     /// From 0.15 on, colors tell the poses apart. `None` if there are no colors, or none that tell
     /// poses apart.
     pub color_gap: Option<f64>,
-    /// MSSD from the returned pose, meters.
+    /// MSSD from the returned pose, meters, by samples of the surface: up to a tenth too low.
     pub mssd_meters: f64,
     /// Smallest angle to the rotation of the returned pose, degrees.
     pub rotation_degrees: f64,

@@ -69,8 +69,9 @@ Examples:
 
 Run `hybrid-icp help refine` for the details of a command.
 Exit codes: 0 done, 1 something failed, 2 the command line is wrong, 130
-interrupted. Ctrl-C and SIGTERM end the program within a second. `bop refine`
-and `experiment` then continue with --resume, `bop compare` without it.";
+interrupted. Ctrl-C and SIGTERM end the program within a second. `bop refine`,
+`bop estimate` and `experiment` then continue with --resume, `bop compare`
+without it.";
 
 #[derive(Debug, Subcommand)]
 enum Command {

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 
 use anyhow::{Context as _, bail};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -17,6 +18,15 @@ pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Prints a summary of an output file, to standard error if the file itself is standard output.
+pub(crate) fn say_of(output: &Path, text: impl Display) -> anyhow::Result<()> {
+    if output != Path::new("-") {
+        return say(text);
+    }
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    Ok(())
 }
 
 /// Prints a warning to standard error. Ignores failures, because they cannot be reported.

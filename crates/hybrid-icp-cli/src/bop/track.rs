@@ -17,7 +17,7 @@ use super::statistics::{count, median};
 use super::{faults, models};
 use crate::options::positive;
 use crate::pose_json::add_pose;
-use crate::terminal::{counted, progress_bar, say, warn};
+use crate::terminal::{counted, progress_bar, say_of, warn};
 
 /// Track a moving object through the images of a scene, without masks.
 ///
@@ -88,12 +88,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         lines.iter().map(|line| line.json(scene_id, object)),
         seen.map(|line| line.row(scene_id, object)),
     )?;
-    say(format_args!(
+    let text = format!(
         "{}: {} of scene {scene_id}, object {object}{}",
         follow.output.display(),
         counted(lines.len(), "image"),
         summarize(&lines),
-    ))?;
+    );
+    say_of(&follow.output, text)?;
     let fps = arguments.fps;
     if fps > MAX_FPS {
         warn(format_args!(

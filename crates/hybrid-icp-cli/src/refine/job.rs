@@ -13,7 +13,7 @@ use super::trace::{self, TraceLines};
 use super::warnings;
 use crate::choice::PipelineArguments;
 use crate::outputs::{Files, check_png, write_json, write_picture};
-use crate::terminal::{check_stdout, say, warn};
+use crate::terminal::{check_stdout, say, say_of, warn};
 
 /// The pipeline and the outputs.
 #[derive(Debug, Args)]
@@ -131,15 +131,16 @@ impl JobOptions {
             write_picture(path, &picture)?;
         }
         report.warnings.iter().for_each(warn);
-        match self.output {
-            Some(_) => say(summary),
+        match &self.output {
+            Some(output) => say_of(output, summary),
             None => say(serde_json::to_string_pretty(&report)?),
         }
     }
 
     fn check_files(&self, inputs: &Inputs) -> anyhow::Result<()> {
+        let stdout = PathBuf::from("-");
         let mut files = Files::default()
-            .writes("--output", &self.output)
+            .writes("--output", [self.output.as_ref().unwrap_or(&stdout)])
             .writes("--alternatives", &self.alternatives)
             .writes("--overlay", &self.overlay)
             .writes("--trace", &self.trace);

@@ -50,8 +50,8 @@ pub(crate) struct EvalJob {
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) errors: Option<PathBuf>,
     /// Also report whether the scores, from 0 to 1, rank correct rows first: the area under the ROC
-    /// curve, and the share of correct rows by range of the score. A row is correct if its ADI is
-    /// below a tenth of the diameter.
+    /// curve, and the share of correct rows by range of the score. A row is correct if its MSSD
+    /// is below a tenth of the diameter; ADI is reported, too.
     #[arg(long)]
     pub(crate) calibration: bool,
     #[command(flatten)]

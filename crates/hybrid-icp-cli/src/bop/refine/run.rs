@@ -15,7 +15,7 @@ use super::{journal, rows_file, settings, warnings};
 use crate::bop::models;
 use crate::interrupt;
 use crate::outputs::journal_of;
-use crate::terminal::{counted, progress_bar, say, warn};
+use crate::terminal::{counted, progress_bar, say_of, warn};
 
 impl RefineJob<'_> {
     /// Refines the rows, writes the output and reports what happened.
@@ -66,6 +66,9 @@ impl RefineJob<'_> {
         for result in &results {
             result.enter(&mut rows, self.rescore, self.timed);
         }
+        if self.dataset.has_color() {
+            uncolored_frames(&shared, &frames).iter().for_each(warn);
+        }
         let poses = (!self.estimates()).then_some("that --results is in mm");
         let images = warnings::about_images(&results, &rows, poses);
         // The output may replace the input. Write it last, so that a run that fails before can be
@@ -110,7 +113,7 @@ impl RefineJob<'_> {
         }
         text.push_str(&summary(self, &results, &shared.models, &distrust));
         // Warnings go to standard error even if standard output fails.
-        let said = say(text);
+        let said = say_of(self.output, text);
         images.iter().for_each(warn);
         if self.distrusts {
             distrust.warn(self);
@@ -158,4 +161,20 @@ impl RefineJob<'_> {
         progress.finish_and_clear();
         ran
     }
+}
+
+/// Returns a warning if colors are used, and some images have none.
+fn uncolored_frames(shared: &DatasetRefiner, frames: &[FrameRows]) -> Option<String> {
+    let mut models = shared.models.by_id.values();
+    models.find(|model| model.mesh().color().is_some())?;
+    let without = |frame: &&FrameRows| {
+        let (scene_id, im_id) = frame.0;
+        let scene = shared.scenes.get(scene_id);
+        scene.is_ok_and(|scene| scene.color_path(im_id).is_none())
+    };
+    let count = frames.iter().filter(without).count();
+    (count > 0).then(|| {
+        let of = counted(frames.len(), "frame");
+        format!("{count} of {of} have no image in rgb/: their rows are refined by depth alone")
+    })
 }

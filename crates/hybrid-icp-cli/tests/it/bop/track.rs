@@ -59,6 +59,11 @@ fn a_moving_mug_is_tracked_in_a_generated_scene() {
     });
     let rows = read_results(folder.path("out.csv")).unwrap();
     assert!(rows.iter().map(|row| row.score).eq(scores));
+    // On the standard output, nothing follows the lines.
+    let words = TRACK.replace("out.jsonl", "-");
+    let told = folder.command(words).exits(0);
+    assert_eq!(told.out.lines().count(), 12);
+    told.complains(&parts);
 }
 
 #[test]

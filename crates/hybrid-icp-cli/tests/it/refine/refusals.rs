@@ -159,6 +159,10 @@ fn outputs_are_checked_before_anything_is_read() {
         .run()
         .fails(&["--output", "--overlay", "standard output"]);
     assert_eq!(told.out, "");
+    // Without --output, the report goes there.
+    let scene = Scene::new().without("--output").with("--alternatives", "-");
+    let told = scene.run().fails(&["--alternatives", "standard output"]);
+    assert_eq!(told.out, "");
     let scene = Scene::new().with("--output", "x").with("--overlay", "./x");
     scene
         .run()
