@@ -29,6 +29,8 @@ const SEARCHED_RADII: f64 = 0.3;
 const SURE_DIAMETERS: f64 = 0.05;
 /// Time for which a pose that was searched has to be seen before it counts as right, seconds.
 const TRIAL_SECONDS: f64 = 1.0;
+/// Rise of the unexplained share of the pixels at which other rotations are tried.
+const APPEARED: f64 = 0.03;
 /// Largest deviation of a prediction near which a registration need not be sure, in diameters.
 const NEAR_DIAMETERS: f64 = 0.4;
 
@@ -82,6 +84,9 @@ pub struct Tracker {
     unseen: f64,
     /// `true` if another pose explains the image as well.
     ambiguous: bool,
+    /// Unexplained share of the pixels around the object when other rotations were tried, or the
+    /// smallest one since.
+    unexplained: f64,
 }
 
 impl Tracker {
@@ -96,6 +101,7 @@ impl Tracker {
             state: TrackState::Lost,
             unseen: 0.0,
             ambiguous: false,
+            unexplained: 0.0,
         }
     }
 
@@ -110,6 +116,7 @@ impl Tracker {
         self.state = TrackState::Doubtful;
         self.unseen = 0.0;
         self.ambiguous = false;
+        self.unexplained = 0.0;
     }
 
     /// Replaces the camera, for images of different sizes or intrinsic parameters.
@@ -191,6 +198,17 @@ impl Tracker {
             self.ambiguous = ambiguous;
         }
         let unsure = motion.deviation(&self.matcher.extent) > 2.0 * SURE_DIAMETERS * diameter;
+        if let Some(found) = seen {
+            let unexplained = found.unexplained();
+            if unsure && !lost && !self.ambiguous && unexplained > self.unexplained + APPEARED {
+                // A part may have come into view, such as the handle of a mug.
+                if let Some(better) = self.matcher.turn(depth, mask, found, &motion)? {
+                    (motion, seen) = (self.at(&better), Some(better.0));
+                }
+                self.unexplained = unexplained;
+            }
+            self.unexplained = self.unexplained.min(unexplained).max(0.0);
+        }
         // Another surface rarely looks like the object in two images.
         let mut confirmed = match &mut self.trial {
             Some(trial) => {

@@ -1,5 +1,6 @@
 //! The search for a lost object.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use hicp_core::internal::small::{eigen3, inverse3};
@@ -7,6 +8,7 @@ use hicp_core::{
     DepthImage, ImageError, Isometry3, Mask, Matrix6, Observation, Problem, Translation3,
     UnitQuaternion, Vector3,
 };
+use hicp_score::{MeanVsd, Score};
 
 use super::found::Found;
 use super::matcher::{Matcher, ROUGH_ITERATIONS, run};
@@ -37,6 +39,10 @@ const ROTATIONS: [[f64; 3]; 7] = [
     [-1.0, 0.0, 0.0],
 ];
 const ROTATION: f64 = 0.8;
+/// Number of rotations around an open axis.
+const TURNS: usize = 24;
+/// Distance around the object up to which its parts may lie after such a rotation, in diameters.
+const TURNED_DIAMETERS: f64 = 0.3;
 /// Smallest angle between the rotations of poses that look alike, degrees.
 const SPACING_DEGREES: f64 = 30.0;
 
@@ -157,6 +163,54 @@ impl Matcher {
             .is_some_and(|other| odds(&rivals[0]) - odds(other) < CLEAR_ODDS);
         let covariance = self.covariance(&observation, &rivals[0], f64::INFINITY);
         Ok(((rivals[0], covariance), ambiguous))
+    }
+
+    /// Rotates a pose around the axis that the motion leaves open.
+    ///
+    /// Returns a pose that explains the image clearly better, with its covariance.
+    pub(super) fn turn(
+        &mut self,
+        depth: &Arc<DepthImage>,
+        mask: Option<&Mask>,
+        found: Found,
+        motion: &Motion,
+    ) -> Result<Option<(Found, Matrix6<f64>)>, ImageError> {
+        let Some((axis, point)) = motion.open_axis(&self.extent) else {
+            return Ok(None);
+        };
+        let model = Arc::clone(&self.model);
+        let around = self.observe(
+            depth,
+            mask,
+            &found.pose,
+            TURNED_DIAMETERS * model.diameter(),
+        )?;
+        let problem = Problem::new(&model, &around);
+        let turned = |index: usize| {
+            let angle = TAU * index as f64 / TURNS as f64;
+            let place = Translation3::from(point.coords);
+            place * UnitQuaternion::from_axis_angle(&axis, angle) * place.inverse() * found.pose
+        };
+        let mut ranked: Vec<_> = (1..TURNS)
+            .map(|index| {
+                let pose = turned(index);
+                let mut context = self.workspace.context(&problem);
+                (self.ranking.score(&mut context, &pose), pose)
+            })
+            .collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut best: Option<Found> = None;
+        for (_, pose) in &ranked[..2] {
+            let rival = self.register(&around, pose);
+            let rival = rival.filter(|rival| self.is_new(&rival.pose, &[found]));
+            if let Some(rival) = rival.filter(|r| best.is_none_or(|best| r.mve < best.mve)) {
+                best = Some(rival);
+            }
+        }
+        // Both in the same pixels.
+        let mve = MeanVsd::default().score(&mut self.workspace.context(&problem), &found.pose);
+        let better = best.filter(|best| best.mve < mve - CLEAR_MVE && best.stands_alone());
+        Ok(better.map(|better| (better, self.covariance(&around, &better, f64::INFINITY))))
     }
 
     /// Returns the logarithm of the odds that a pose is right, given the predicted place.

@@ -80,7 +80,7 @@ impl Found {
     }
 
     /// Returns the unexplained share of the pixels around the object, without those of noise.
-    fn unexplained(&self) -> f64 {
+    pub(super) fn unexplained(&self) -> f64 {
         self.evidence.unexplained - 2.0 * self.outside()
     }
 

@@ -48,6 +48,8 @@ pub(super) struct Matcher {
     /// The same after a stage that also pulls the object along its own surface.
     far: Cascade<(Far, Fit)>,
     pub(super) search: Search,
+    /// Ranks rotations around an open axis.
+    pub(super) ranking: SampledMve,
     /// Lists the poses that look like a given one.
     pub(super) look_alikes: LookAlikeCount<SampledMve, MeanVsd>,
     pub(super) workspace: Workspace,
@@ -70,6 +72,7 @@ impl Matcher {
             far: Cascade((far(), near.clone())),
             near,
             search: quick_search(),
+            ranking: SampledMve::imperfect_mask(),
             look_alikes: look_alikes(),
             workspace: Workspace::new(Rasterizer::default()),
             widening: Widening::default(),

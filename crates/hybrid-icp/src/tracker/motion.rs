@@ -1,7 +1,7 @@
 //! The motion of an object: a filter that predicts its pose and knows how uncertain it is.
 
-use hicp_core::internal::small::{blocks, inverse6};
-use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, Vector6, so3};
+use hicp_core::internal::small::{blocks, eigen6, inverse6};
+use hicp_core::{Isometry3, Matrix3, Matrix6, Point3, UnitVector3, Vector6, so3};
 
 use crate::extent::{Extent, difference, moved, squares};
 
@@ -81,6 +81,20 @@ impl Motion {
     /// Returns the standard deviation of the least determined displacement of an object, meters.
     pub(super) fn deviation(&self, extent: &Extent) -> f64 {
         extent.deviation(&self.pose, &self.of_pose)
+    }
+
+    /// Returns the axis of the least certain displacement and a point on it, if it is a rotation.
+    pub(super) fn open_axis(&self, extent: &Extent) -> Option<(UnitVector3<f64>, Point3<f64>)> {
+        let scale = extent.displacement(&self.pose);
+        let eigen = eigen6(&(scale * self.of_pose * scale.transpose()))?;
+        let least = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+        if least.fixed_rows::<3>(3).norm() < 0.7 {
+            return None;
+        }
+        let step = inverse6(&scale)? * least;
+        let (shift, turn) = (step.fixed_rows::<3>(0), step.fixed_rows::<3>(3));
+        let point = self.center() + turn.cross(&shift) / turn.norm_squared();
+        Some((UnitVector3::new_normalize(turn.into_owned()), point))
     }
 
     /// Moves the pose by a time in seconds.

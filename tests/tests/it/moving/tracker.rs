@@ -189,6 +189,36 @@ fn a_slow_mug_that_hides_its_handle_stays_doubtful() {
     }
 }
 
+/// The local registration does not find the handle, because it is far from that of the pose.
+#[test]
+fn a_handle_that_comes_into_view_ends_the_doubt() {
+    let model = Household::Mug.model().unwrap();
+    let upright =
+        UnitQuaternion::from_basis_unchecked(&[Vector3::z(), -Vector3::x(), -Vector3::y()]);
+    let tilted = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.4) * upright;
+    let pose = |angle| {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+        Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.6), tilted * turn)
+    };
+    for direction in [-1.0, 1.0] {
+        let mut tracker = Tracker::new(model.clone(), camera(), TrackerConfig::default());
+        tracker.start(&pose(-0.6 * direction));
+        for frame in 0..75 {
+            let truth = pose(direction * 0.03 * f64::from(frame));
+            let depth = hicp_tests::render(&model, &camera(), &truth).0;
+            let tracked = tracker.step(depth, SECONDS, None).unwrap();
+            let off = se3::pose_distance(&tracked.camera_from_object, &truth).0;
+            let expected = if off < 0.1 {
+                TrackState::Tracking
+            } else {
+                TrackState::Doubtful
+            };
+            assert_eq!(tracked.state, expected, "{frame}: {off}");
+            assert!(off < 0.1 || frame < 50, "{frame}: {off}");
+        }
+    }
+}
+
 /// The guess for a lost object starts from the pose that was followed last.
 #[test]
 fn an_object_that_was_found_and_followed_is_not_guessed_where_it_was_lost_before() {
