@@ -34,7 +34,7 @@ pub(crate) struct Array<'a> {
 impl<'a> Array<'a> {
     /// Parses the array of an NPY file, or the only array of an NPZ archive.
     ///
-    /// If an archive has several arrays, the one with a name of `names` counts.
+    /// If an archive has several arrays, the first of `names` that it has counts.
     pub(crate) fn parse(
         limits: &ReadLimits,
         path: &Path,
@@ -233,14 +233,13 @@ impl<'a> Archive<'a> {
         IoError::new(path, None, found, "an NPZ file").with_source(error)
     }
 
-    /// Returns the only array, or the one with a name of `names`.
+    /// Returns the only array, or the one with the first of `names` that the archive has.
     fn find(&self, names: &[&str]) -> Result<&Member, IoError> {
         if let [only] = &self.members[..] {
             return Ok(only);
         }
-        let mut members = self.members.iter();
-        let named = members.find(|member| names.contains(&&*member.name));
-        named.ok_or_else(|| {
+        let named = |name: &&str| self.members.iter().find(|member| member.name == *name);
+        names.iter().find_map(named).ok_or_else(|| {
             let shown = self.members.iter().take(8);
             let shown: Vec<String> = shown.map(|member| quote(&member.name)).collect();
             let found = format!("{} arrays: {}", self.members.len(), shown.join(", "));
@@ -253,21 +252,18 @@ impl<'a> Archive<'a> {
     fn extract(&self, member: &Member, most: u64) -> Result<Vec<u8>, IoError> {
         let entry = self.zip.get_entry(member.place);
         let entry = entry.map_err(|error| Self::not_complete(self.path, error))?;
-        let mut array = Vec::new();
-        let data = entry.data();
-        let read = match member.method {
-            CompressionMethod::STORE => data.take(most).read_to_end(&mut array),
-            CompressionMethod::DEFLATE => {
-                let data = DeflateDecoder::new(data);
-                data.take(most).read_to_end(&mut array)
-            }
+        let data: Box<dyn Read> = match member.method {
+            CompressionMethod::STORE => Box::new(entry.data()),
+            CompressionMethod::DEFLATE => Box::new(DeflateDecoder::new(entry.data())),
             other => {
                 let found = format!("{other:?} compression");
                 let expected = "np.savez or np.savez_compressed";
                 return Err(IoError::new(self.path, None, found, expected));
             }
         };
-        read.map_err(|error| {
+        // The checksum is verified at the end.
+        let (mut data, mut array) = (entry.verifying_reader(data).take(most), Vec::new());
+        data.read_to_end(&mut array).map_err(|error| {
             let found = format!("the damaged array {}", quote(&member.name));
             IoError::new(self.path, None, found, "an NPZ file").with_source(error)
         })?;

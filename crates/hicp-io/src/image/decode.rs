@@ -11,8 +11,15 @@ use crate::format::{self, Format};
 use crate::limits::ReadLimits;
 use crate::source::read_head;
 
-/// Reads an image of any supported format. `expected` is what the file is for.
-pub(super) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<Raster, IoError> {
+/// Reads an image of any supported format.
+///
+/// `name` is "depth" or "mask", and `formats` lists the formats for an error.
+pub(super) fn read(
+    limits: &ReadLimits,
+    path: &Path,
+    name: &str,
+    formats: &str,
+) -> Result<Raster, IoError> {
     let (head, _) = read_head(path)?;
     let content = || limits.read_bytes(path);
     match Format::of(&head) {
@@ -24,7 +31,7 @@ pub(super) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<R
         #[cfg(feature = "tiff")]
         Some(Format::Tiff) => super::tiff::decode(limits, path, &content()?),
         #[cfg(feature = "npy")]
-        Some(Format::Npy | Format::Npz) => super::npy::decode(limits, path, &content()?),
+        Some(Format::Npy | Format::Npz) => super::npy::decode(limits, path, &content()?, name),
         #[cfg(not(feature = "exr"))]
         Some(Format::Exr) => Err(format::without_feature(path, Format::Exr, "exr")),
         #[cfg(not(feature = "tiff"))]
@@ -33,6 +40,9 @@ pub(super) fn read(limits: &ReadLimits, path: &Path, expected: &str) -> Result<R
         Some(found @ (Format::Npy | Format::Npz)) => {
             Err(format::without_feature(path, found, "npy"))
         }
-        _ => Err(format::refuse(path, &head, expected)),
+        _ => {
+            let expected = format!("a {name} image as {formats}");
+            Err(format::refuse(path, &head, &expected))
+        }
     }
 }

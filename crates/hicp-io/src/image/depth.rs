@@ -63,7 +63,7 @@ impl ReadLimits {
 }
 
 /// The supported formats.
-const EXPECTED: &str = "a depth image as PNG, TIFF, NPY, NPZ, EXR, PGM or PFM";
+const FORMATS: &str = "PNG, TIFF, NPY, NPZ, EXR, PGM or PFM";
 
 /// Reads a depth image of any supported format, recognized by its first bytes.
 ///
@@ -73,7 +73,8 @@ const EXPECTED: &str = "a depth image as PNG, TIFF, NPY, NPZ, EXR, PGM or PFM";
 /// 0, NaN, infinity and negative numbers mean missing, and so does 65535 in 16 bits.
 /// `millimeters_per_unit` is the depth of one unit. `None` means that the numbers are meters, which
 /// only floating point can be. Of an EXR file, the channel `Z` or `depth` counts, also that of a
-/// layer, or the only channel. NPZ archives need a single array, or one named `depth`.
+/// layer, or the only channel. Of an NPZ archive, the array `depth` counts, or else `image`, `data`
+/// or `arr_0`, or the only array.
 ///
 /// # Errors
 ///
@@ -144,7 +145,7 @@ impl ReadLimits {
     /// As for [`read_depth`].
     pub fn read_raw_depth(&self, path: impl AsRef<Path>) -> Result<RawDepth, IoError> {
         let path = path.as_ref();
-        let raster = decode::read(self, path, EXPECTED)?;
+        let raster = decode::read(self, path, "depth", FORMATS)?;
         let is_gray = raster.channels == 1 && raster.background.is_none();
         if is_gray && raster.integer_bits.is_none_or(|bits| bits >= 16) {
             let path = path.to_owned();

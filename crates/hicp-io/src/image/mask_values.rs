@@ -11,7 +11,7 @@ use crate::limits::ReadLimits;
 use crate::number::{narrow, whole};
 
 /// The supported formats.
-const EXPECTED: &str = "a mask as PNG, TIFF, BMP, NPY, NPZ or PGM";
+const FORMATS: &str = "PNG, TIFF, BMP, NPY, NPZ or PGM";
 
 /// The pixels of a mask that belong to the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,7 +50,8 @@ pub struct MaskFile {
 ///
 /// `rule` selects the pixels of the object by their value. The value of a pixel is its gray value,
 /// or in a palette image its index. Colors that are not gray have values from [`MaskRule::COLOR`].
-/// If the opacity of an image varies, it is the value instead; an opaque image has its colors.
+/// If the opacity of an image varies, it is the value instead; an opaque image has its colors. Of
+/// an NPZ archive, the array `mask` counts, or else `image`, `data` or `arr_0`, or the only array.
 ///
 /// # Errors
 ///
@@ -68,7 +69,7 @@ impl ReadLimits {
     /// As for [`read_mask`].
     pub fn read_mask(&self, path: impl AsRef<Path>, rule: MaskRule) -> Result<MaskFile, IoError> {
         let path = path.as_ref();
-        MaskFile::of(path, &decode::read(self, path, EXPECTED)?, rule)
+        MaskFile::of(path, &decode::read(self, path, "mask", FORMATS)?, rule)
     }
 }
 

@@ -8,12 +8,17 @@ use crate::limits::ReadLimits;
 use crate::npy::Array;
 use crate::number::narrow;
 
-/// The names of arrays that are preferred in an NPZ archive.
-const NAMES: [&str; 5] = ["depth", "mask", "image", "data", "arr_0"];
-
 /// Decodes an array of the shape (height, width), with an optional last axis of channels.
-pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result<Raster, IoError> {
-    let array = Array::parse(limits, path, content, &NAMES)?;
+///
+/// Of the arrays of an NPZ archive, the one called `name` comes first.
+pub(super) fn decode(
+    limits: &ReadLimits,
+    path: &Path,
+    content: &[u8],
+    name: &str,
+) -> Result<Raster, IoError> {
+    let names = [name, "image", "data", "arr_0"];
+    let array = Array::parse(limits, path, content, &names)?;
     // A single image may have an axis of length 1 in front.
     let shape = match array.shape[..] {
         [1, ref shape @ ..] if shape.len() >= 2 && shape[0] > 1 => shape,

@@ -51,6 +51,7 @@ fn floating_point_is_in_meters() {
         "depth_f64_fortran.npy",
         "depth_single.npz",
         "depth_named.npz",
+        "depth_and_mask.npz",
         "depth_opencv.pfm",
         "depth_zip.exr",
         "depth_zips.exr",
@@ -92,6 +93,12 @@ fn files_that_cannot_be_depth_are_refused_with_advice() {
         refused(read_depth(fixture(name), Some(1.0)), &[name, found, advice]);
     }
     let folder = Folder::new();
+    let mut damaged = std::fs::read(fixture("depth_single.npz")).unwrap();
+    // The last byte of the array is the one before the directory.
+    let directory = damaged.windows(4).position(|bytes| bytes == b"PK\x01\x02");
+    damaged[directory.unwrap() - 1] ^= 1;
+    let damaged = read_depth(folder.write("depth.npz", damaged), None);
+    refused(damaged, &["the damaged array \"arr_0\""]);
     let empty = read_depth(folder.write("depth.png", ""), Some(1.0));
     refused(empty, &["depth.png: found an empty file"]);
 }
@@ -120,6 +127,7 @@ fn masks_of_two_values_need_no_option() {
         "mask_u8.tiff",
         "mask_bool.npy",
         "mask_u8_channel.npy",
+        "depth_and_mask.npz",
     ] {
         check_mask(name, MaskRule::NotZero);
     }

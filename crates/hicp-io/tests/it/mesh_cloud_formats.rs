@@ -125,6 +125,7 @@ fn clouds_of_every_format_are_the_same() {
         "cloud_bare_colors.xyz",
         "cloud.npy",
         "cloud_bare_organized.npy",
+        "cloud_bare_several.npz",
     ] {
         let cloud = read_cloud(fixture(name), LengthUnit::Meters).unwrap();
         assert_eq!((cloud.points.len(), cloud.n_skipped), (3, 0), "{name}");
