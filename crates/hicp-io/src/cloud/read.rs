@@ -18,9 +18,10 @@ const EXPECTED: &str = "a point cloud as PLY, PCD, XYZ, CSV or NPY";
 ///   and `nz`, and are normalized. Faces and other elements are skipped.
 /// - PCD: text, binary and compressed, with `x`, `y`, `z` and, if there, `normal_x`, `normal_y` and
 ///   `normal_z`. The viewpoint is not applied.
-/// - Text (XYZ, CSV, PTS): one point per line, separated by white space or commas. The names of the
-///   columns may come first.
-/// - NPY and NPZ: an array whose last axis has the coordinates.
+/// - Text (XYZ, CSV, PTS): one point per line, separated by white space, commas or semicolons. The
+///   names of the columns may come first. An empty cell is as NaN.
+/// - NPY and NPZ: an array whose last axis has the coordinates. Of several arrays, `points` counts,
+///   or else `xyz`, `positions`, `cloud` or `arr_0`.
 ///
 /// Columns 4 to 6 without names are normals if all of them have length 1. Points that are not
 /// finite are skipped, as sensors write them where nothing was measured. So are those without a

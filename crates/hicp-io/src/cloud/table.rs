@@ -9,40 +9,104 @@ const NAMES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
 /// Parses lines of numbers.
 pub(super) fn parse_text(reading: Reading<'_>, text: &str) -> Result<PointCloud, IoError> {
-    let is_separator = |c: char| c.is_whitespace() || ",;".contains(c);
     let lines = text.trim_start_matches('\u{feff}').lines().zip(1..);
-    let lines = lines.map(|(line, number)| (line.trim(), number));
-    let mut columns: Option<[Option<usize>; 6]> = None;
+    let lines = lines.filter(|(line, _)| !line.trim().is_empty());
+    let separator = separator(lines.clone().map(|(line, _)| line));
+    let mut columns = [0, 1, 2, 3, 4, 5].map(Some);
+    let mut named = false;
     let mut rows = Vec::new();
-    for (line, number) in lines.filter(|(line, _)| !line.is_empty()) {
-        let words = line.trim_start_matches(['#', '/']).split(is_separator);
-        let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
-        // The columns may have names, in a comment or not. PTS files start with a count.
-        let names: Vec<String> = words.iter().map(|word| word.to_lowercase()).collect();
-        if rows.is_empty() && names.iter().any(|name| name == "x") {
-            columns = Some(NAMES.map(|wanted| names.iter().position(|name| name == wanted)));
-            continue;
-        }
-        if line.starts_with(['#', '/']) || (rows.is_empty() && words.len() == 1) {
-            continue;
-        }
-        let columns = columns.unwrap_or([0, 1, 2, 3, 4, 5].map(Some));
-        let values = columns.map(|column| match column.and_then(|column| words.get(column)) {
-            Some(word) => word.parse().ok(),
-            None => Some(f64::NAN),
-        });
-        let [Some(_), Some(_), Some(_), ..] = values else {
-            let place = Place::Line(number);
-            return Err(reading.refuse(place, quote(line), "the coordinates of a point"));
+    for (line, number) in lines {
+        let refuse = |found: String, expected: &str| {
+            Err(reading.refuse(Place::Line(number), found, expected))
         };
-        // Words after the coordinates may be of any kind.
-        rows.push((
-            Place::Line(number),
-            values.map(|value| value.unwrap_or(f64::NAN)),
-        ));
+        // The columns may have names, in a comment or not. PTS files start with a count.
+        if rows.is_empty()
+            && let Some(names) = header(line, separator)
+        {
+            let count = |wanted: &&&str| names.iter().filter(|name| name == *wanted).count();
+            if let Some(twice) = NAMES.iter().find(|wanted| count(wanted) > 1) {
+                return refuse(format!("two columns {}", quote(twice)), "one of each name");
+            }
+            columns = NAMES.map(|wanted| names.iter().position(|name| name == wanted));
+            named = columns.iter().all(Option::is_some);
+            continue;
+        }
+        let cells = cells(line, separator);
+        if is_comment(line) || (rows.is_empty() && cells.len() == 1) {
+            continue;
+        }
+        let mut row = [f64::NAN; 6];
+        for (index, value) in row.iter_mut().enumerate() {
+            let cell = columns[index].and_then(|column| cells.get(column));
+            match cell.map(|cell| (cell, cell.parse())) {
+                Some((_, Ok(number))) => *value = number,
+                // Tables have nothing where nothing was measured.
+                Some((&"", _)) => {}
+                Some((cell, _)) if index < 3 || separator == Some(';') && cell.contains(',') => {
+                    let found = format!("{} in the column {}", quote(cell), NAMES[index]);
+                    return refuse(found, "a number such as 0.5");
+                }
+                None if index < 3 => {
+                    let found = format!("{}, without a column {}", quote(line), NAMES[index]);
+                    return refuse(found, "the coordinates of a point");
+                }
+                // Words after the coordinates may be of any kind.
+                _ => {}
+            }
+        }
+        rows.push((Place::Line(number), row));
     }
-    let named = columns.is_some_and(|columns| columns[3..].iter().all(Option::is_some));
     collect(reading, &rows, named)
+}
+
+fn is_comment(line: &str) -> bool {
+    line.trim_start().starts_with(['#', '/'])
+}
+
+/// Returns the cells of a line. Only white space, which is `None`, may be repeated.
+fn cells(line: &str, separator: Option<char>) -> Vec<&str> {
+    match separator {
+        Some(separator) => line.split(separator).map(str::trim).collect(),
+        None => line.split_whitespace().collect(),
+    }
+}
+
+/// Returns the character between the cells of a table, or `None` for white space.
+///
+/// It is the one that splits the first lines into the most numbers, and then the most cells. A
+/// semicolon comes first, since the commas of such a table are those of its decimals.
+fn separator<'a>(lines: impl Iterator<Item = &'a str>) -> Option<char> {
+    let lines = lines.filter(|line| !is_comment(line)).take(20);
+    let lines: Vec<&str> = lines.collect();
+    if lines.iter().any(|line| line.matches(';').count() > 1) {
+        return Some(';');
+    }
+    let fit = |separator: &Option<char>| {
+        let cells: Vec<&str> = lines
+            .iter()
+            .flat_map(|line| cells(line, *separator))
+            .collect();
+        let numbers = cells.iter().filter(|cell| cell.parse::<f64>().is_ok());
+        (numbers.count(), cells.len())
+    };
+    let separators = [None, Some(','), Some('\t')].into_iter();
+    separators.max_by_key(fit).flatten()
+}
+
+/// Returns the names of the columns in lower case, if a line has those of the coordinates.
+///
+/// The header of a comment may have another separator than the numbers.
+fn header(line: &str, separator: Option<char>) -> Option<Vec<String>> {
+    let line = line.to_lowercase().replace('"', "");
+    let line = match is_comment(&line) {
+        true => line.trim_start_matches(|c: char| c.is_whitespace() || "#/".contains(c)),
+        false => &line,
+    };
+    let words = line.split(|c: char| c.is_whitespace() || ",;".contains(c));
+    let words = words.filter(|word| !word.is_empty()).collect();
+    let mut splits = [cells(line, separator), words].into_iter();
+    let names = splits.find(|names| NAMES[..3].iter().all(|name| names.contains(name)));
+    names.map(|names| names.into_iter().map(str::to_owned).collect())
 }
 
 /// Parses an array whose last axis has the coordinates.
@@ -50,10 +114,11 @@ pub(super) fn parse_text(reading: Reading<'_>, text: &str) -> Result<PointCloud,
 pub(super) fn parse_npy(reading: Reading<'_>, content: &[u8]) -> Result<PointCloud, IoError> {
     let names = ["points", "xyz", "positions", "cloud", "arr_0"];
     let array = crate::npy::Array::parse(reading.limits, reading.path, content, &names)?;
-    // A few rows of many numbers are the coordinates of a transposed array.
-    let columns = match array.shape[..] {
-        [3..=6, 7..=usize::MAX] | [] | [_] => None,
-        [.., columns] => Some(columns),
+    // A few rows or channels of many numbers are the coordinates of a transposed array.
+    let columns = match &array.shape[..] {
+        [axes @ .., columns] if *columns > 6 && axes.iter().any(|n| matches!(n, 3..=6)) => None,
+        [_, .., columns] => Some(*columns),
+        _ => None,
     };
     let Some(columns @ 3..) = columns else {
         let found = format!("an array of the shape {:?}", array.shape);

@@ -154,6 +154,35 @@ fn points_without_a_usable_normal_are_skipped() {
     assert_eq!((cloud.points.len(), cloud.n_skipped), (1, 2));
 }
 
+/// Empty cells keep their place. Without a coordinate, a point is skipped.
+#[test]
+fn tables_have_one_separator() {
+    let folder = Folder::new();
+    for text in [
+        "x,y,z,c\n1,2,3,9\n1,,3,9\n",
+        "x\ty\tz\tc\n1\t2\t3\t9\n\t2\t3\t9\n",
+        "point id,x,y,z\n7,1,2,3\n,1,2,\n",
+        "time,,x,y,z\n7,,1,2,3\n8,5,1,nan,3\n",
+        "c;\"x\";\"y\";\"z\"\n;1;2;3;\nlow, far;1;;3\n",
+        "# z y x\n3, 2, 1,\n3, 2, ,\n",
+        "2\n1 2 3\n1 2 nan\n",
+        "//x, y, z\n  1  2\t 3 # far\n1 2 nan\n",
+        "1,\t2,\t3\n1,\t,\t3\n",
+    ] {
+        let cloud = read_cloud(folder.write("a.csv", text), LengthUnit::Meters).unwrap();
+        assert_eq!(cloud.points, [[1.0, 2.0, 3.0].into()], "{text}");
+        assert_eq!(cloud.n_skipped, 1, "{text}");
+    }
+}
+
+/// Returns an NPY file of bytes.
+fn npy(shape: &str) -> Vec<u8> {
+    let header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({shape})}}");
+    let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+    let start = [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes()].concat();
+    [start, vec![1; 10_000]].concat()
+}
+
 #[test]
 fn files_that_are_no_cloud_are_refused() {
     let folder = Folder::new();
@@ -168,7 +197,34 @@ fn files_that_are_no_cloud_are_refused() {
                 .to_vec(),
             "x, y and z",
         ),
-        (b"1 2 3\n4 five 6\n".to_vec(), "line 2: found \"4 five 6\""),
+        (
+            b"1 2 3\n4 five 6\n".to_vec(),
+            "line 2: found \"five\" in the column y",
+        ),
+        (
+            b"x;y;z\n1;2;3\n0,1;0,2;0,3\n".to_vec(),
+            "line 3: found \"0,1\" in the column x",
+        ),
+        (
+            b"0,1;0,2;0,3\n".to_vec(),
+            "line 1: found \"0,1\" in the column x",
+        ),
+        (
+            b"1;2;3;0,6;0,8;0\n".to_vec(),
+            "found \"0,6\" in the column nx",
+        ),
+        (b"0,1 0,2 0,3\n".to_vec(), "in the column y"),
+        (
+            b"i,x,y,z\n0,1,2,3\n1,2\n".to_vec(),
+            "line 3: found \"1,2\", without a column y",
+        ),
+        (
+            b"x,y,X,Y,Z\n1,2,3,4,5\n".to_vec(),
+            "line 1: found two columns \"x\"",
+        ),
+        (npy("3, 48, 64"), "[3, 48, 64]"),
+        (npy("1, 3, 50"), "[1, 3, 50]"),
+        (npy("3, 50"), "[3, 50]"),
         (b"\x89HDF\r\n\x1a\n".to_vec(), "an HDF5 file"),
         (b"".to_vec(), "no points"),
     ] {
