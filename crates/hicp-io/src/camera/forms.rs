@@ -35,6 +35,15 @@ const FLAT: [[&str; 5]; 4] = [FX, FY, CX, CY];
 const WIDTH: [&str; 3] = ["width", "image_width", "w"];
 const HEIGHT: [&str; 3] = ["height", "image_height", "h"];
 const MODEL: [&str; 3] = ["distortion_model", "model", "camera_model"];
+/// The distortions that RealSense numbers in this order, as `rs2_distortion`.
+const REALSENSE: [&str; 6] = [
+    "none",
+    "modified Brown-Conrady",
+    "inverse Brown-Conrady",
+    "ftheta",
+    "Brown-Conrady",
+    "Kannala-Brandt",
+];
 
 /// Reads a camera for images of `image_size` (width, height) in pixels, in any common form.
 ///
@@ -276,8 +285,17 @@ impl Form<'_> {
 
     fn distortion(&self) -> Result<Option<Distortion>, IoError> {
         let (key, mut k) = self.coefficients()?;
-        let model = self.member(&MODEL).and_then(|(_, name)| name.as_str());
-        let model = model.unwrap_or_default();
+        let model = match self.member(&MODEL).map(|(_, model)| model) {
+            None | Some(Value::Null) => String::new(),
+            Some(Value::String(name)) => name.clone(),
+            Some(other) => {
+                let number = other
+                    .as_u64()
+                    .and_then(|number| usize::try_from(number).ok());
+                let name = number.and_then(|number| REALSENSE.get(number));
+                name.map_or_else(|| other.to_string(), ToString::to_string)
+            }
+        };
         if k.iter().all(|k| *k == 0.0) {
             return Ok(None);
         }
@@ -292,7 +310,7 @@ impl Form<'_> {
             "" | "plumb_bob" | "rational_polynomial" | "radtan" | "opencv" | "pinhole" => true,
             _ => has("brown"),
         };
-        if fisheye && let [k1, k2, k3, k4] = k[..] {
+        if fisheye && let [k1, k2, k3, k4] | [k1, k2, k3, k4, 0.0] = k[..] {
             return Ok(Some(Distortion::KannalaBrandt([k1, k2, k3, k4])));
         }
         if brown
@@ -302,7 +320,7 @@ impl Form<'_> {
             k.resize(8, 0.0);
             return Ok(k.try_into().ok().map(Distortion::BrownConrady));
         }
-        let found = format!("the distortion {} of {} numbers", quote(model), k.len());
+        let found = format!("the distortion {} of {} numbers", quote(&model), k.len());
         let expected = "Brown–Conrady with 4, 5 or 8 numbers (plumb_bob, rational_polynomial), or \
                         Kannala–Brandt with 4 (equidistant, fisheye): undistort the images first";
         Err(self.refuse(&format!(".{key}"), found, expected))

@@ -125,6 +125,35 @@ fn a_distortion_is_read_next_to_every_form_of_a_camera() {
 }
 
 #[test]
+fn distortions_of_realsense_may_be_numbers() {
+    let folder = Folder::new();
+    let camera = r#""fx": 600, "fy": 610, "ppx": 320.5, "ppy": 240.25"#;
+    let read = |model: &str, first: f64| {
+        let text = format!(r#"{{{camera}, "model": {model}, "coeffs": [{first}, 0.2, 0, 0, 0]}}"#);
+        read_camera(
+            folder.write("camera.json", text.replace("0, 0.2", "0, 0")),
+            (640, 480),
+        )
+    };
+    let brown = Distortion::BrownConrady([0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(read("4", 0.1).unwrap().distortion, Some(brown));
+    let fisheye = Distortion::KannalaBrandt([0.1, 0.2, 0.0, 0.0]);
+    assert_eq!(read("5", 0.1).unwrap().distortion, Some(fisheye));
+    for (model, name) in [
+        ("0", "\"none\" of 5 numbers"),
+        ("1", "\"modified Brown-Conrady\""),
+        ("2", "\"inverse Brown-Conrady\""),
+        ("3", "\"ftheta\""),
+        ("6", "\"6\""),
+        ("-1", "\"-1\""),
+        ("[4]", "\"[4]\""),
+    ] {
+        refused(read(model, 0.1), &[name, "undistort"]);
+        assert_eq!(read(model, 0.0).unwrap().distortion, None);
+    }
+}
+
+#[test]
 fn distorted_points_agree_with_opencv() {
     let text = std::fs::read_to_string(fixture("distorted.json")).unwrap();
     let rows: std::collections::BTreeMap<String, Vec<[f64; 2]>> =
