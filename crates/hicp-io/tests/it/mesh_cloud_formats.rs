@@ -1,5 +1,7 @@
 //! glTF meshes and point clouds that other programs wrote (`tests/fixtures/make.py`).
 
+use std::path::PathBuf;
+
 use hicp_core::TriMesh;
 use hicp_io::{LengthUnit, read_cloud, read_mesh};
 use serde_json::Value;
@@ -86,6 +88,82 @@ fn compressed_and_misnamed_meshes_are_refused_with_advice() {
     ] {
         refused(read_mesh(path, LengthUnit::Meters), &parts);
     }
+}
+
+/// Returns a glTF file with a node of one triangle, whose vertices are the first of `accessors`.
+fn triangle(folder: &Folder, data: &[u8], views: &str, accessors: &str, rest: &str) -> PathBuf {
+    folder.write("a.bin", data);
+    let text = format!(
+        r#"{{"buffers": [{{"uri": "a.bin", "byteLength": {}}}], "bufferViews": [{views}],
+        "accessors": [{accessors}], "meshes": [{{"primitives": [{{"attributes":
+        {{"POSITION": 0}}}}]}}], {rest}}}"#,
+        data.len(),
+    );
+    folder.write("a.gltf", text)
+}
+
+#[test]
+fn only_small_integers_are_normalized() {
+    let folder = Folder::new();
+    let read = |data: &[u8], views: &str, accessor: &str| {
+        let rest = r#""nodes": [{"mesh": 0}]"#;
+        let accessor = format!(r#"{{"type": "VEC3", "count": 3, "normalized": true, {accessor}}}"#);
+        let path = triangle(&folder, data, views, &accessor, rest);
+        bounds(&read_mesh(path, LengthUnit::Meters).unwrap())
+    };
+    let floats = [0.0_f32, 0.0, 0.0, -3.0, 0.0, 0.0, 0.0, 2.0, 0.0].map(f32::to_le_bytes);
+    let view = r#"{"buffer": 0, "byteLength": 36}"#;
+    let found = read(
+        floats.as_flattened(),
+        view,
+        r#""bufferView": 0, "componentType": 5126"#,
+    );
+    assert_eq!(found, [[-3.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
+    // Two bytes are the indices 1 and 2 of the sparse values in the others.
+    let data = [1, 2, 127, 0, 0, 0, 127, 0];
+    let views =
+        r#"{"buffer": 0, "byteLength": 2}, {"buffer": 0, "byteOffset": 2, "byteLength": 6}"#;
+    let sparse = r#""componentType": 5120, "sparse": {"count": 2, "values": {"bufferView": 1},
+        "indices": {"bufferView": 0, "componentType": 5121}}"#;
+    assert_eq!(read(&data, views, sparse), [[0.0; 3], [1.0, 1.0, 0.0]]);
+}
+
+#[test]
+fn only_joints_move_a_mesh_with_a_skin() {
+    let folder = Folder::new();
+    let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let read = |rest: &str| {
+        let view = r#"{"buffer": 0, "byteLength": 36}"#;
+        let accessor = r#"{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}"#;
+        let path = triangle(&folder, corners.as_flattened(), view, accessor, rest);
+        read_mesh(path, LengthUnit::Meters)
+    };
+    let skin = |other: f64| {
+        read(&format!(
+            r#""skins": [{{"joints": [1, 2]}}], "nodes": [{{"mesh": 0, "skin": 0, "scale":
+            [9, 9, 9]}}, {{"translation": [0, 0, 5]}}, {{"translation": [0, 0, {other}]}}]"#
+        ))
+    };
+    assert_eq!(
+        bounds(&skin(5.0).unwrap()),
+        [[0.0, 0.0, 5.0], [1.0, 1.0, 5.0]]
+    );
+    refused(
+        skin(5.1),
+        &["$.skins[0]: found joints that deform", "apply the armature"],
+    );
+    let required = |name: &str| {
+        read(&format!(
+            r#""nodes": [{{"mesh": 0}}], "extensionsRequired": ["{name}"]"#
+        ))
+    };
+    required("KHR_texture_transform").unwrap();
+    let parts = [
+        "$.extensionsRequired",
+        "\"EXT_mesh_gpu_instancing\"",
+        "Blender",
+    ];
+    refused(required("EXT_mesh_gpu_instancing"), &parts);
 }
 
 #[test]

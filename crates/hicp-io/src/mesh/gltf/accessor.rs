@@ -26,7 +26,7 @@ struct Layout {
 }
 
 impl Accessors<'_, '_> {
-    /// Reads the elements of an accessor, each of one to four components, one after another.
+    /// Reads the elements of an accessor, one after another, each of one to four components or 16.
     ///
     /// `limit` applies to the number of elements; indices are three per triangle.
     pub(super) fn read(
@@ -41,7 +41,8 @@ impl Accessors<'_, '_> {
             let expected = format!("one of {} accessors", accessors.len());
             return Err(reading.refuse(place, "an accessor that does not exist", expected));
         };
-        let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"][components - 1];
+        let shapes = ["SCALAR", "VEC2", "VEC3", "VEC4"];
+        let shape = shapes.get(components - 1).copied().unwrap_or("MAT4");
         if accessor.shape != shape {
             return Err(reading.refuse(place, quote(&accessor.shape), shape));
         }
@@ -59,19 +60,22 @@ impl Accessors<'_, '_> {
             None => vec![0.0; accessor.count * components],
         };
         if let Some(sparse) = &accessor.sparse {
-            let part = |part: &SparsePart, kind, components| {
+            let part = |part: &SparsePart, layout| {
                 let layout = Layout {
                     offset: part.byte_offset,
-                    kind,
-                    components,
                     count: sparse.count,
                     ..layout
                 };
                 self.elements(&place, part.buffer_view, layout)
             };
-            let kind = sparse.indices.component_type.unwrap_or(0);
-            let indices = part(&sparse.indices, kind, 1)?;
-            let values = part(&sparse.values, accessor.component_type, components)?;
+            let plain = Layout {
+                kind: sparse.indices.component_type.unwrap_or(0),
+                components: 1,
+                normalized: false,
+                ..layout
+            };
+            let indices = part(&sparse.indices, plain)?;
+            let values = part(&sparse.values, layout)?;
             for (index, value) in indices.iter().zip(values.chunks_exact(components)) {
                 let at = whole(*index) as usize * components;
                 let Some(element) = numbers.get_mut(at..at + components) else {
@@ -128,25 +132,25 @@ impl Accessors<'_, '_> {
         let numbers = used.chunks(stride).flat_map(|element| {
             let components = element.chunks_exact(number.bytes).take(layout.components);
             let numbers = components.filter_map(|bytes| number.read(bytes, false));
-            numbers.map(|number| match layout.normalized {
+            numbers.map(|number| match largest {
                 // Normalized integers are from -1 to 1.
-                true => (number / largest).max(-1.0),
-                false => number,
+                Some(largest) if layout.normalized => (number / largest).max(-1.0),
+                _ => number,
             })
         });
         Ok(numbers.collect())
     }
 }
 
-/// Returns the type of a component, and the largest value of a normalized one.
-fn component(kind: u32) -> Option<(NumberType, f64)> {
+/// Returns the type of a component, and its largest value if it may be normalized.
+fn component(kind: u32) -> Option<(NumberType, Option<f64>)> {
     let (kind, bytes, largest) = match kind {
-        5120 => (Kind::Signed, 1, 127.0),
-        5121 => (Kind::Unsigned, 1, 255.0),
-        5122 => (Kind::Signed, 2, 32767.0),
-        5123 => (Kind::Unsigned, 2, 65535.0),
-        5125 => (Kind::Unsigned, 4, 1.0),
-        5126 => (Kind::Float, 4, 1.0),
+        5120 => (Kind::Signed, 1, Some(127.0)),
+        5121 => (Kind::Unsigned, 1, Some(255.0)),
+        5122 => (Kind::Signed, 2, Some(32767.0)),
+        5123 => (Kind::Unsigned, 2, Some(65535.0)),
+        5125 => (Kind::Unsigned, 4, None),
+        5126 => (Kind::Float, 4, None),
         _ => return None,
     };
     Some((NumberType { kind, bytes }, largest))

@@ -8,7 +8,7 @@ mod buffers;
 mod paint;
 mod schema;
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use hicp_core::{Isometry3, Matrix4, Point3, Quaternion, Translation3, UnitQuaternion};
 
@@ -17,15 +17,31 @@ use self::paint::Paint;
 use self::schema::{Node, Primitive, Root};
 use super::colors::Colors;
 use super::raw::{FACE, RawMesh, Reading};
-use crate::error::{IoError, Place};
+use crate::error::{IoError, Place, quote};
 use crate::json;
 use crate::limits::Limit;
 use crate::number::whole;
+
+/// Parts of the names of extensions that leave shapes as they are, or that readers of parts handle.
+const KNOWN_EXTENSIONS: [&str; 6] = [
+    "_materials_",
+    "_texture_",
+    "_lights_",
+    "KHR_mesh_quantization",
+    "draco",
+    "meshopt",
+];
 
 /// Parses the triangles of the default scene, with the transforms of its nodes.
 pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_>, IoError> {
     let (text, binary) = buffers::split(&reading, &content)?;
     let root: Root = json::parse(reading.path, text)?;
+    let is_known = |name: &String| KNOWN_EXTENSIONS.iter().any(|part| name.contains(part));
+    if let Some(name) = root.extensions_required.iter().find(|name| !is_known(name)) {
+        let place = Place::Field("$.extensionsRequired".to_owned());
+        let expected = "a file without it: Blender's export writes one";
+        return Err(reading.refuse(place, quote(name), expected));
+    }
     let buffers = buffers::load(&reading, &root, binary)?;
     let mut mesh_colors = Colors::default();
     let paint = match reading.with_color {
@@ -43,7 +59,7 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
             root: &root,
             buffers: &buffers,
         },
-        visited: HashSet::new(),
+        worlds: HashMap::new(),
         paint,
         mesh: RawMesh::new(reading, reading.refuse(place, found, FACE)),
     };
@@ -60,13 +76,16 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     // The stack holds the first node on top, so that vertices are in the order of the file.
     let tops = tops.iter().rev().map(|node| (*node, Matrix4::identity()));
     let mut open: Vec<(usize, Matrix4<f64>)> = tops.collect();
+    let mut meshes = Vec::new();
     while let Some((index, parent)) = open.pop() {
-        let node = scene.visit(index)?;
-        let world = parent * local(node);
-        if let Some(mesh) = node.mesh {
-            scene.add_mesh(mesh, &world)?;
-        }
+        let (node, world) = scene.visit(index, &parent)?;
+        meshes.extend(node.mesh.map(|mesh| (mesh, node.skin, world)));
         open.extend(node.children.iter().rev().map(|child| (*child, world)));
+    }
+    for (mesh, skin, world) in meshes {
+        // With a skin, only its joints count.
+        let world = skin.map_or(Ok(world), |skin| scene.skinned(skin))?;
+        scene.add_mesh(mesh, &world)?;
     }
     Ok(scene.mesh)
 }
@@ -88,24 +107,62 @@ fn local(node: &Node) -> Matrix4<f64> {
 
 struct Scene<'a, 'r> {
     accessors: Accessors<'a, 'r>,
-    visited: HashSet<usize>,
+    /// The transforms of the nodes.
+    worlds: HashMap<usize, Matrix4<f64>>,
     /// The colors of the file, if there are any.
     paint: Option<Paint>,
     mesh: RawMesh<'r>,
 }
 
 impl<'a> Scene<'a, '_> {
-    /// Returns a node. Refuses a node with two parents, which could multiply without end.
-    fn visit(&mut self, index: usize) -> Result<&'a Node, IoError> {
+    /// Returns a node and its transform in the scene.
+    ///
+    /// Refuses a node with two parents, which could multiply without end.
+    fn visit(
+        &mut self,
+        index: usize,
+        parent: &Matrix4<f64>,
+    ) -> Result<(&'a Node, Matrix4<f64>), IoError> {
         let place = Place::Field(format!("$.nodes[{index}]"));
         let (reading, nodes) = (self.mesh.reading, &self.accessors.root.nodes);
         let Some(node) = nodes.get(index) else {
             let expected = format!("one of {} nodes", nodes.len());
             return Err(reading.refuse(place, "a node that does not exist", expected));
         };
-        match self.visited.insert(index) {
-            true => Ok(node),
-            false => Err(reading.refuse(place, "a node with two parents", "a tree of nodes")),
+        let world = parent * local(node);
+        match self.worlds.insert(index, world) {
+            None => Ok((node, world)),
+            Some(_) => Err(reading.refuse(place, "a node with two parents", "a tree of nodes")),
+        }
+    }
+
+    /// Returns the transform of a mesh with a skin, if all joints move it alike.
+    fn skinned(&self, index: usize) -> Result<Matrix4<f64>, IoError> {
+        let place = Place::Field(format!("$.skins[{index}]"));
+        let root = self.accessors.root;
+        let refuse = |found| {
+            let expected = "a mesh in its bind pose: apply the armature and export without it";
+            Err(self.mesh.reading.refuse(place, found, expected))
+        };
+        let Some(skin) = root.skins.get(index) else {
+            return refuse("a skin that does not exist");
+        };
+        let matrices = match skin.inverse_bind_matrices {
+            Some(matrices) => self.accessors.read(matrices, 16, Limit::VERTICES)?,
+            None => Matrix4::<f64>::identity()
+                .as_slice()
+                .repeat(skin.joints.len()),
+        };
+        let joints = skin.joints.iter().zip(matrices.chunks_exact(16));
+        let mut moves = joints.filter_map(|(joint, inverse)| {
+            Some(self.worlds.get(joint)? * Matrix4::from_column_slice(inverse))
+        });
+        let Some(first) = moves.next() else {
+            return refuse("a skin without joints");
+        };
+        match moves.all(|other| (other - first).amax() <= 1e-4 * first.amax()) {
+            true => Ok(first),
+            false => refuse("joints that deform the mesh"),
         }
     }
 
