@@ -20,7 +20,12 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
             refuse(0, found, "a BMP header of at least 50 bytes")
         })
     };
-    let (start, header, bits) = (number(10)?, number(14)?, number(28)? & 0xffff);
+    let (start, header) = (number(10)?, number(14)?);
+    if header < 40 {
+        let found = format!("a header of {header} bytes, as of OS/2");
+        return Err(refuse(14, found, "one of at least 40 bytes, as of Windows"));
+    }
+    let bits = number(28)? & 0xffff;
     let (width, height) = (number(18)?, number(22)?);
     let (compression, colors) = (number(30)?, number(46)?);
     let bits = match (bits, compression) {

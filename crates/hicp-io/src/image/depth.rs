@@ -179,7 +179,8 @@ fn other_pixels(path: &Path, image: &Raster, expected: &str) -> IoError {
 ///
 /// # Errors
 ///
-/// [`IoError`] if the scale is not finite and positive, or if a depth is above 65535 units.
+/// [`IoError`] if the scale is not finite and positive, or if a depth is above 65534 units,
+/// since 65535 means missing.
 /// Otherwise as for [`write_atomically`](crate::write_atomically).
 pub fn write_depth_png(
     path: impl AsRef<Path>,
@@ -204,17 +205,18 @@ fn in_units(
     millimeters_per_unit: f64,
 ) -> Result<Vec<u8>, IoError> {
     check_scale(path, millimeters_per_unit)?;
+    let most = f64::from(DepthImage::SATURATED - 1);
     let mut bytes = Vec::with_capacity(2 * depth.pixels().len());
     for (index, &meters) in depth.pixels().iter().enumerate() {
         let units = (f64::from(meters) * 1000.0 / millimeters_per_unit).round();
-        if !(0.0..=f64::from(u16::MAX)).contains(&units) {
+        if !(0.0..=most).contains(&units) {
             let width = depth.width() as usize;
             let found = format!(
                 "a depth of {meters} m at pixel ({}, {})",
                 index % width,
                 index / width
             );
-            let limit = f64::from(u16::MAX) * millimeters_per_unit / 1000.0;
+            let limit = most * millimeters_per_unit / 1000.0;
             let expected = format!("at most {limit} m at this scale");
             return Err(IoError::new(path, None, found, expected));
         }
@@ -283,5 +285,8 @@ mod tests {
         assert!(!path.exists());
         write_depth_png(&path, &depth, 10.0).unwrap();
         assert_eq!(read_depth_png(&path, 10.0).unwrap(), depth);
+        let saturated = DepthImage::from_meters(1, 1, vec![65.535]).unwrap();
+        let error = write_depth_png(&path, &saturated, 1.0).unwrap_err();
+        assert_eq!(error.expected, "at most 65.534 m at this scale");
     }
 }

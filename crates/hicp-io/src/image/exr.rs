@@ -4,6 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use exr::meta::BlockDescription;
+use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use exr::prelude::{MetaData, ReadChannels, ReadLayers, ReadSpecificChannel, Text, Vec2, read};
 
@@ -80,7 +81,11 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
             ));
         }
     }
-    Ok(Raster::gray(size, None, depth))
+    let is_integer = |channel: &ChannelDescription| {
+        channel.name == *name && channel.sample_type == SampleType::U32
+    };
+    let is_integer = header.channels.list.iter().any(is_integer);
+    Ok(Raster::gray(size, is_integer.then_some(32), depth))
 }
 
 /// Returns the layer and the last part of the name of a channel, in lower case.
@@ -127,6 +132,18 @@ fn is_color_of(red: &Text, other: &Text) -> bool {
 mod tests {
     use super::*;
     use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage};
+
+    #[test]
+    fn unsigned_integers_have_a_unit() {
+        let channel = AnyChannel::new("Z", FlatSamples::U32(vec![700; 2]));
+        let mut bytes = Cursor::new(Vec::new());
+        let image =
+            Image::from_channels((2, 1), AnyChannels::sort([channel].into_iter().collect()));
+        image.write().to_buffered(&mut bytes).unwrap();
+        let raster = decode(&ReadLimits::DEFAULT, Path::new("a.exr"), bytes.get_ref());
+        let raster = raster.unwrap();
+        assert_eq!((raster.integer_bits, raster.samples[0]), (Some(32), 700.0));
+    }
 
     /// Decodes an image of 2x1 pixels, whose channels have the depths 1, 2 and so on.
     fn read(names: &[&str], equal: bool) -> Result<f32, String> {

@@ -27,6 +27,11 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
         let expected = "a header of the width, the height and the largest value or the scale";
         return Err(IoError::new(path, Place::Byte(2), start, expected));
     };
+    if float && last.abs() != 1.0 {
+        let found = format!("the scale {last}");
+        let expected = "1 or -1: multiply the numbers yourself";
+        return Err(IoError::new(path, Place::Byte(2), found, expected));
+    }
     let number = match float {
         true => F32,
         false => NumberType::new(Kind::Unsigned, 1 + usize::from(last > 255.0)),

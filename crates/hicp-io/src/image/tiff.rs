@@ -5,6 +5,7 @@ use std::path::Path;
 
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
 
 use super::raster::{Raster, check_size, unpack};
 use crate::error::IoError;
@@ -33,6 +34,28 @@ pub(super) fn decode(limits: &ReadLimits, path: &Path, content: &[u8]) -> Result
         }
     };
     let bits = usize::from(color.bit_depth());
+    // The decoder ignores the first two. Depth has no white that it could invert.
+    for (tag, values, applies, expected) in [
+        (Tag::Orientation, 2..=8, true, "an upright image (1)"),
+        (
+            Tag::PlanarConfiguration,
+            2..=2,
+            channels > 1,
+            "the samples of a pixel together (1)",
+        ),
+        (
+            Tag::PhotometricInterpretation,
+            0..=0,
+            bits >= 16,
+            "black as 0 (1)",
+        ),
+    ] {
+        let value: Option<u16> = decoder.find_tag_unsigned(tag).map_err(failed)?;
+        if let Some(value) = value.filter(|value| applies && values.contains(value)) {
+            let found = format!("the {tag:?} {value}");
+            return Err(IoError::new(path, None, found, expected));
+        }
+    }
     let row = width as usize * channels;
     let raw = (row * bits).div_ceil(8) as u64 * u64::from(height);
     let size = (u64::from(width), u64::from(height));

@@ -103,6 +103,50 @@ fn files_that_cannot_be_depth_are_refused_with_advice() {
     refused(empty, &["depth.png: found an empty file"]);
 }
 
+/// Returns the content of a little-endian TIFF file with one entry of its tags replaced.
+fn with_tag(name: &str, tag: u16, other: u16, value: u8) -> Vec<u8> {
+    let mut content = std::fs::read(fixture(name)).unwrap();
+    let first = u32::from_le_bytes(*content[4..].first_chunk().unwrap()) as usize + 2;
+    let entries = content[first..].chunks(12);
+    let index = entries.take_while(|entry| !entry.starts_with(&tag.to_le_bytes()));
+    let at = first + 12 * index.count();
+    content[at..at + 2].copy_from_slice(&other.to_le_bytes());
+    content[at + 8] = value;
+    content
+}
+
+#[test]
+fn variants_of_a_format_that_change_the_meaning_are_refused() {
+    let folder = Folder::new();
+    let mut os2 = std::fs::read(fixture("mask_red.bmp")).unwrap();
+    os2[14] = 12;
+    for (content, parts) in [
+        (
+            with_tag("depth_u16.tiff", 296, 274, 6),
+            ["the Orientation 6", "upright"],
+        ),
+        (
+            with_tag("depth_u16.tiff", 262, 262, 0),
+            ["the PhotometricInterpretation 0", "black"],
+        ),
+        (
+            std::fs::read(fixture("mask_planar.tiff")).unwrap(),
+            ["the PlanarConfiguration 2", "together"],
+        ),
+        (os2, ["a header of 12 bytes", "at least 40"]),
+        (
+            b"Pf\n1 1\n-0.5\n\0\0\0\0".to_vec(),
+            ["the scale -0.5", "multiply"],
+        ),
+    ] {
+        let path = folder.write("image", content);
+        refused(read_depth(&path, Some(1.0)), &parts);
+        refused(read_mask(&path, MaskRule::NotZero), &parts);
+    }
+    let upright = folder.write("image", with_tag("depth_u16.tiff", 296, 274, 1));
+    read_depth(upright, Some(1.0)).unwrap();
+}
+
 /// Asserts that a mask selects the object, without a warning.
 fn check_mask(name: &str, rule: MaskRule) {
     let file = read_mask(fixture(name), rule).unwrap();
