@@ -129,7 +129,7 @@ fn only_small_integers_are_normalized() {
 }
 
 #[test]
-fn only_joints_move_a_mesh_with_a_skin() {
+fn skins_morph_targets_and_extensions_do_not_move_a_mesh_unseen() {
     let folder = Folder::new();
     let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let read = |rest: &str| {
@@ -152,6 +152,8 @@ fn only_joints_move_a_mesh_with_a_skin() {
         skin(5.1),
         &["$.skins[0]: found joints that deform", "apply the armature"],
     );
+    let morphed = read(r#""nodes": [{"mesh": 0, "weights": [0, 0.5]}]"#);
+    refused(morphed, &["$.meshes[0]: found morph targets", "shape keys"]);
     let required = |name: &str| {
         read(&format!(
             r#""nodes": [{{"mesh": 0}}], "extensionsRequired": ["{name}"]"#

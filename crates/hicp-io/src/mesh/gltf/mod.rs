@@ -79,13 +79,13 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     let mut meshes = Vec::new();
     while let Some((index, parent)) = open.pop() {
         let (node, world) = scene.visit(index, &parent)?;
-        meshes.extend(node.mesh.map(|mesh| (mesh, node.skin, world)));
+        meshes.extend(node.mesh.map(|mesh| (mesh, node, world)));
         open.extend(node.children.iter().rev().map(|child| (*child, world)));
     }
-    for (mesh, skin, world) in meshes {
+    for (mesh, node, world) in meshes {
         // With a skin, only its joints count.
-        let world = skin.map_or(Ok(world), |skin| scene.skinned(skin))?;
-        scene.add_mesh(mesh, &world)?;
+        let world = node.skin.map_or(Ok(world), |skin| scene.skinned(skin))?;
+        scene.add_mesh(mesh, node, &world)?;
     }
     Ok(scene.mesh)
 }
@@ -166,7 +166,7 @@ impl<'a> Scene<'a, '_> {
         }
     }
 
-    fn add_mesh(&mut self, index: usize, world: &Matrix4<f64>) -> Result<(), IoError> {
+    fn add_mesh(&mut self, index: usize, node: &Node, world: &Matrix4<f64>) -> Result<(), IoError> {
         let root = self.accessors.root;
         let Some(mesh) = root.meshes.get(index) else {
             let place = Place::Field(format!("$.meshes[{index}]"));
@@ -176,6 +176,13 @@ impl<'a> Scene<'a, '_> {
             );
             return Err(reading.refuse(place, "a mesh that does not exist", expected));
         };
+        let mut weights = node.weights.iter().chain(&mesh.weights).take(1).flatten();
+        if weights.any(|weight| *weight != 0.0) {
+            let place = Place::Field(format!("$.meshes[{index}]"));
+            let found = "morph targets with weights";
+            let expected = "no weights but 0: apply the shape keys and export without them";
+            return Err(self.mesh.reading.refuse(place, found, expected));
+        }
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = Place::Field(format!("$.meshes[{index}].primitives[{number}]"));
             self.add_primitive(primitive, (index, number), &place, world)?;

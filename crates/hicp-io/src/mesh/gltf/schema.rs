@@ -37,6 +37,8 @@ pub(super) struct Node {
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
     pub(super) skin: Option<usize>,
+    /// Of the morph targets. They replace those of the mesh.
+    pub(super) weights: Option<Vec<f64>>,
     /// By columns.
     pub(super) matrix: Option<Numbers<16>>,
     pub(super) translation: Option<Numbers<3>>,
@@ -57,6 +59,7 @@ pub(super) struct Skin {
 #[derive(Debug, Deserialize)]
 pub(super) struct Mesh {
     pub(super) primitives: Vec<Primitive>,
+    pub(super) weights: Option<Vec<f64>>,
 }
 
 #[derive(Debug, Deserialize)]
