@@ -134,8 +134,9 @@ fn skins_morph_targets_and_extensions_do_not_move_a_mesh_unseen() {
     let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let read = |rest: &str| {
         let view = r#"{"buffer": 0, "byteLength": 36}"#;
-        let accessor = r#"{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}"#;
-        let path = triangle(&folder, corners.as_flattened(), view, accessor, rest);
+        let accessors = r#"{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"componentType": 5126, "count": 1000000, "type": "MAT4"}"#;
+        let path = triangle(&folder, corners.as_flattened(), view, accessors, rest);
         read_mesh(path, LengthUnit::Meters)
     };
     let skin = |other: f64| {
@@ -152,6 +153,9 @@ fn skins_morph_targets_and_extensions_do_not_move_a_mesh_unseen() {
         skin(5.1),
         &["$.skins[0]: found joints that deform", "apply the armature"],
     );
+    let matrices = r#""skins": [{"joints": [0], "inverseBindMatrices": 1}], "nodes": [{"mesh": 0,
+        "skin": 0}]"#;
+    refused(read(matrices), &["another number of matrices"]);
     let morphed = read(r#""nodes": [{"mesh": 0, "weights": [0, 0.5]}]"#);
     refused(morphed, &["$.meshes[0]: found morph targets", "shape keys"]);
     let required = |name: &str| {

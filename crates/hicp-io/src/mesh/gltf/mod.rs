@@ -8,6 +8,7 @@ mod buffers;
 mod paint;
 mod schema;
 
+use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 
 use hicp_core::{Isometry3, Matrix4, Point3, Quaternion, Translation3, UnitQuaternion};
@@ -82,9 +83,14 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
         meshes.extend(node.mesh.map(|mesh| (mesh, node, world)));
         open.extend(node.children.iter().rev().map(|child| (*child, world)));
     }
+    let mut skins = HashMap::new();
     for (mesh, node, world) in meshes {
-        // With a skin, only its joints count.
-        let world = node.skin.map_or(Ok(world), |skin| scene.skinned(skin))?;
+        // With a skin, only its joints count. A skin may belong to many nodes.
+        let world = match node.skin.map(|skin| (skin, skins.entry(skin))) {
+            None => world,
+            Some((_, Entry::Occupied(known))) => *known.get(),
+            Some((skin, Entry::Vacant(new))) => *new.insert(scene.skinned(skin)?),
+        };
         scene.add_mesh(mesh, node, &world)?;
     }
     Ok(scene.mesh)
@@ -147,7 +153,12 @@ impl<'a> Scene<'a, '_> {
         let Some(skin) = root.skins.get(index) else {
             return refuse("a skin that does not exist");
         };
-        let matrices = match skin.inverse_bind_matrices {
+        let matrices = skin.inverse_bind_matrices;
+        let accessor = matrices.and_then(|matrices| root.accessors.get(matrices));
+        if accessor.is_some_and(|accessor| accessor.count != skin.joints.len()) {
+            return refuse("another number of matrices than of joints");
+        }
+        let matrices = match matrices {
             Some(matrices) => self.accessors.read(matrices, 16, Limit::VERTICES)?,
             None => Matrix4::<f64>::identity()
                 .as_slice()
