@@ -282,6 +282,12 @@ impl Parameters<'_> {
         Ok(parts)
     }
 
+    /// Returns whether a field is given.
+    pub(crate) fn has(&self, field: &str) -> bool {
+        let mut reading = self.reading.iter();
+        reading.any(|(_, fields)| fields.field(field).0.is_some())
+    }
+
     /// Returns the error of a value that is wrong only together with others.
     #[must_use]
     pub fn refuse(&self, field: &str, expected: String) -> PipelineError {

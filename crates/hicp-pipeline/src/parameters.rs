@@ -79,7 +79,9 @@ impl Parameters<'_> {
         meaning: &'static str,
     ) -> Result<Vec<f64>, PipelineError> {
         let parameter = Parameter::new(name, "", meaning, Accepts::NumberList);
-        self.read(parameter, None, Vec::new(), |value| list(value, number))
+        self.read(parameter, None, Vec::new(), |value| {
+            list(value, |entry| number(entry).filter(|x| x.is_finite()))
+        })
     }
 
     /// Reads a list of `N` flags, all false by default.

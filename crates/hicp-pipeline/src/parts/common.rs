@@ -25,7 +25,11 @@ pub(super) fn length(
         ("diameters", Length::Diameters as fn(f64) -> Length),
         ("meters", Length::Meters),
     ];
-    Ok(p.word("unit", &units, "unit of the length")?(length))
+    let unit = p.word("unit", &units, "unit of the length")?;
+    if p.has("unit") && !p.has(name) {
+        return Err(p.refuse(name, "a length in `unit`".to_owned()));
+    }
+    Ok(unit(length))
 }
 
 /// Reads the spacing of a pixel grid: about so many points, or every so many pixels.
@@ -36,6 +40,9 @@ pub(super) fn stride(
 ) -> Result<Stride, PipelineError> {
     let points = p.count("points", 1, points, meaning)?;
     let pixels = p.count("pixels", 0, 0, "spacing of the grid instead, if not 0")?;
+    if pixels > 0 && p.has("points") {
+        return Err(p.refuse("points", "no points next to pixels".to_owned()));
+    }
     Ok(match pixels {
         0 => Stride::AboutPoints(points),
         _ => Stride::Pixels(pixels),

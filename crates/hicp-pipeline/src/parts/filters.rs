@@ -49,11 +49,13 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_filter("var-trimmed", |p| {
         p.about = "Keeps the share of the pairs with the least fractional RMSD. Source: Phillips, \
             Liu & Tomasi 2007. Cost: O(n log n).";
-        Ok(VarTrimmed::new(
-            p.number("min_keep", SHARE, 0.05, "smallest share to keep")?,
-            p.number("max_keep", SHARE, 0.99, "largest share to keep")?,
-            p.number("lambda", FACTOR, 0.95, "exponent of the share")?,
-        ))
+        let least = p.number("min_keep", SHARE, 0.05, "smallest share to keep")?;
+        let most = p.number("max_keep", SHARE, 0.99, "largest share to keep")?;
+        if least > most {
+            return Err(p.refuse("min_keep", format!("at most max_keep, {most}")));
+        }
+        let lambda = p.number("lambda", FACTOR, 0.95, "exponent of the share")?;
+        Ok(VarTrimmed::new(least, most, lambda))
     });
     catalog.add_filter("one-to-one", |p| {
         p.about = "Keeps for every observed point the closest of its pairs. Cost: O(n log n).";

@@ -236,10 +236,12 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_switcher("thresholds", |p| {
         p.about = "Selects regime k where exactly k bounds are at or below a score. \
             Source: §IV-A.2, generalized. Cost: a score.";
-        Ok(Thresholds {
-            score: p.part::<BoxedScore>("score", "mve", "the score")?,
-            bounds: p.numbers("bounds", "bounds of the score, ascending")?,
-        })
+        let score = p.part::<BoxedScore>("score", "mve", "the score")?;
+        let bounds = p.numbers("bounds", "bounds of the score, ascending")?;
+        if !bounds.is_sorted() {
+            return Err(p.refuse("bounds", "ascending numbers".to_owned()));
+        }
+        Ok(Thresholds { score, bounds })
     });
 }
 

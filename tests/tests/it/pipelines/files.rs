@@ -162,6 +162,28 @@ fn messages_name_the_line_the_field_and_the_expected_value() {
             "my.toml:5: filter.0.unit: found the text \"feet\", expected one of diameters, meters",
         ),
         (
+            format!("{icp}filter = [{{ type = \"max-distance\", unit = \"meters\" }}]\n"),
+            "my.toml:5: filter.0.limit: missing, expected a length in `unit`",
+        ),
+        (
+            format!("{icp}filter = [{{ type = \"var-trimmed\", min_keep = 1 }}]\n"),
+            "my.toml:5: filter.0.min_keep: found 1, expected at most max_keep, 0.99",
+        ),
+        (
+            icp.replace(
+                "\"all-samples\"",
+                "{ type = \"visible-surface\", points = 9, pixels = 2 }",
+            ),
+            "my.toml:2: selection.points: found 9, expected no points next to pixels",
+        ),
+        (
+            icp.replace(
+                "\"point-to-plane\"",
+                "{ type = \"weighted-sum\", metrics = [\"point-to-plane\"], weights = [nan] }",
+            ),
+            "my.toml:4: metric.weights: found a list of 1, expected a list of numbers",
+        ),
+        (
             format!("{icp}stop = [{{ type = \"iteration-limit\", iterations = 2.5 }}]\n"),
             "my.toml:5: stop.0.iterations: found 2.5, expected a whole number of 0 or more",
         ),
