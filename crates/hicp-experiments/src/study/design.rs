@@ -50,6 +50,10 @@ pub trait Design: Clone + Debug + PartialEq + Sync + Serialize + DeserializeOwne
                 expected,
             )
         };
+        if ["objects", "version", "experiment"].contains(&field) {
+            let found = "a field that the command sets".to_owned();
+            return Err(wrong(found, "another field of config.json"));
+        }
         // The keys of all maps are text, so a configuration always serializes.
         let mut fields = serde_json::to_value(self).unwrap_or_default();
         let Some(value) = fields.get_mut(field) else {

@@ -132,9 +132,10 @@ fn study(experiment: Experiment, arguments: &Arguments) -> anyhow::Result<()> {
     let threads = matches!(experiment, Experiment::Timing).then_some(1);
     let names = [experiment.name(), "cases"];
     options.run(&config, &subjects, &out, names, threads)?;
-    if experiment.is_binned() && poses < config.bins as u64 {
+    if experiment.is_binned() && !poses.is_multiple_of(config.bins as u64) {
         warn(format_args!(
-            "--poses {poses} fills {poses} of {0} bins of the initial VSD, expected {0} or more",
+            "--poses is {poses}, expected a multiple of the {0} bins of the initial VSD: figures \
+             over all bins weigh some of them more",
             config.bins
         ));
     }
