@@ -26,7 +26,7 @@ struct Layout {
 }
 
 impl Accessors<'_, '_> {
-    /// Reads the elements of an accessor, one after another, each of one to four components or 16.
+    /// Reads the elements of an accessor, each of one to four components, one after another.
     ///
     /// `limit` applies to the number of elements; indices are three per triangle.
     pub(super) fn read(
@@ -41,8 +41,7 @@ impl Accessors<'_, '_> {
             let expected = format!("one of {} accessors", accessors.len());
             return Err(reading.refuse(place, "an accessor that does not exist", expected));
         };
-        let shapes = ["SCALAR", "VEC2", "VEC3", "VEC4"];
-        let shape = shapes.get(components - 1).copied().unwrap_or("MAT4");
+        let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"][components - 1];
         if accessor.shape != shape {
             return Err(reading.refuse(place, quote(&accessor.shape), shape));
         }

@@ -8,8 +8,7 @@ mod buffers;
 mod paint;
 mod schema;
 
-use std::collections::hash_map::Entry;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use hicp_core::{Isometry3, Matrix4, Point3, Quaternion, Translation3, UnitQuaternion};
 
@@ -60,7 +59,7 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
             root: &root,
             buffers: &buffers,
         },
-        worlds: HashMap::new(),
+        visited: HashSet::new(),
         paint,
         mesh: RawMesh::new(reading, reading.refuse(place, found, FACE)),
     };
@@ -77,21 +76,13 @@ pub(super) fn parse(reading: Reading<'_>, content: Vec<u8>) -> Result<RawMesh<'_
     // The stack holds the first node on top, so that vertices are in the order of the file.
     let tops = tops.iter().rev().map(|node| (*node, Matrix4::identity()));
     let mut open: Vec<(usize, Matrix4<f64>)> = tops.collect();
-    let mut meshes = Vec::new();
     while let Some((index, parent)) = open.pop() {
-        let (node, world) = scene.visit(index, &parent)?;
-        meshes.extend(node.mesh.map(|mesh| (mesh, node, world)));
+        let node = scene.visit(index)?;
+        let world = parent * local(node);
+        if let Some(mesh) = node.mesh {
+            scene.add_mesh(mesh, node, &world)?;
+        }
         open.extend(node.children.iter().rev().map(|child| (*child, world)));
-    }
-    let mut skins = HashMap::new();
-    for (mesh, node, world) in meshes {
-        // With a skin, only its joints count. A skin may belong to many nodes.
-        let world = match node.skin.map(|skin| (skin, skins.entry(skin))) {
-            None => world,
-            Some((_, Entry::Occupied(known))) => *known.get(),
-            Some((skin, Entry::Vacant(new))) => *new.insert(scene.skinned(skin)?),
-        };
-        scene.add_mesh(mesh, node, &world)?;
     }
     Ok(scene.mesh)
 }
@@ -113,67 +104,24 @@ fn local(node: &Node) -> Matrix4<f64> {
 
 struct Scene<'a, 'r> {
     accessors: Accessors<'a, 'r>,
-    /// The transforms of the nodes.
-    worlds: HashMap<usize, Matrix4<f64>>,
+    visited: HashSet<usize>,
     /// The colors of the file, if there are any.
     paint: Option<Paint>,
     mesh: RawMesh<'r>,
 }
 
 impl<'a> Scene<'a, '_> {
-    /// Returns a node and its transform in the scene.
-    ///
-    /// Refuses a node with two parents, which could multiply without end.
-    fn visit(
-        &mut self,
-        index: usize,
-        parent: &Matrix4<f64>,
-    ) -> Result<(&'a Node, Matrix4<f64>), IoError> {
+    /// Returns a node. Refuses a node with two parents, which could multiply without end.
+    fn visit(&mut self, index: usize) -> Result<&'a Node, IoError> {
         let place = Place::Field(format!("$.nodes[{index}]"));
         let (reading, nodes) = (self.mesh.reading, &self.accessors.root.nodes);
         let Some(node) = nodes.get(index) else {
             let expected = format!("one of {} nodes", nodes.len());
             return Err(reading.refuse(place, "a node that does not exist", expected));
         };
-        let world = parent * local(node);
-        match self.worlds.insert(index, world) {
-            None => Ok((node, world)),
-            Some(_) => Err(reading.refuse(place, "a node with two parents", "a tree of nodes")),
-        }
-    }
-
-    /// Returns the transform of a mesh with a skin, if all joints move it alike.
-    fn skinned(&self, index: usize) -> Result<Matrix4<f64>, IoError> {
-        let place = Place::Field(format!("$.skins[{index}]"));
-        let root = self.accessors.root;
-        let refuse = |found| {
-            let expected = "a mesh in its bind pose: apply the armature and export without it";
-            Err(self.mesh.reading.refuse(place, found, expected))
-        };
-        let Some(skin) = root.skins.get(index) else {
-            return refuse("a skin that does not exist");
-        };
-        let matrices = skin.inverse_bind_matrices;
-        let accessor = matrices.and_then(|matrices| root.accessors.get(matrices));
-        if accessor.is_some_and(|accessor| accessor.count != skin.joints.len()) {
-            return refuse("another number of matrices than of joints");
-        }
-        let matrices = match matrices {
-            Some(matrices) => self.accessors.read(matrices, 16, Limit::VERTICES)?,
-            None => Matrix4::<f64>::identity()
-                .as_slice()
-                .repeat(skin.joints.len()),
-        };
-        let joints = skin.joints.iter().zip(matrices.chunks_exact(16));
-        let mut moves = joints.filter_map(|(joint, inverse)| {
-            Some(self.worlds.get(joint)? * Matrix4::from_column_slice(inverse))
-        });
-        let Some(first) = moves.next() else {
-            return refuse("a skin without joints");
-        };
-        match moves.all(|other| (other - first).amax() <= 1e-4 * first.amax()) {
-            true => Ok(first),
-            false => refuse("joints that deform the mesh"),
+        match self.visited.insert(index) {
+            true => Ok(node),
+            false => Err(reading.refuse(place, "a node with two parents", "a tree of nodes")),
         }
     }
 
@@ -188,10 +136,10 @@ impl<'a> Scene<'a, '_> {
             return Err(reading.refuse(place, "a mesh that does not exist", expected));
         };
         let mut weights = node.weights.iter().chain(&mesh.weights).take(1).flatten();
-        if weights.any(|weight| *weight != 0.0) {
+        if node.skin.is_some() || weights.any(|weight| *weight != 0.0) {
             let place = Place::Field(format!("$.meshes[{index}]"));
-            let found = "morph targets with weights";
-            let expected = "no weights but 0: apply the shape keys and export without them";
+            let found = "a mesh that a skin or morph targets deform";
+            let expected = "a rigid mesh: apply the armature and the shape keys before the export";
             return Err(self.mesh.reading.refuse(place, found, expected));
         }
         for (number, primitive) in mesh.primitives.iter().enumerate() {

@@ -16,7 +16,6 @@ pub(super) struct Root {
     pub(super) scene: Option<usize>,
     pub(super) scenes: Vec<SceneNodes>,
     pub(super) nodes: Vec<Node>,
-    pub(super) skins: Vec<Skin>,
     pub(super) meshes: Vec<Mesh>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
@@ -45,15 +44,6 @@ pub(super) struct Node {
     /// A quaternion: x, y, z, w.
     pub(super) rotation: Option<Numbers<4>>,
     pub(super) scale: Option<Numbers<3>>,
-}
-
-/// The nodes that move the vertices of a mesh.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Skin {
-    pub(super) joints: Vec<usize>,
-    /// An accessor of matrices, one per joint.
-    pub(super) inverse_bind_matrices: Option<usize>,
 }
 
 #[derive(Debug, Deserialize)]
