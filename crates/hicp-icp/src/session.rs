@@ -40,7 +40,8 @@ impl Workspace {
 
     /// Returns a model rendered at a pose, for a camera without an observation.
     ///
-    /// The render is in the cache that runs use.
+    /// The render is in the cache that runs use. It draws [`Model::drawn`]; a run that compares
+    /// colors draws the whole mesh.
     pub fn view(
         &mut self,
         model: &Model,

@@ -14,7 +14,7 @@ use crate::limits::limits;
 use crate::options::positive;
 use crate::outputs::{Files, write_json};
 use crate::pose_json::add_pose;
-use crate::terminal::{check_stdout, say, warn};
+use crate::terminal::{check_stdout, say, say_beside, warn};
 
 /// Register two point clouds: find the pose that moves one onto the other.
 ///
@@ -175,7 +175,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Verdict::KeptInitial(_) => "kept the initial pose",
     };
     let (iterations, reason) = (found.outcome.iterations, termination.explain());
-    say(format!(
-        "{verdict}: {fit}, {iterations} iterations: {reason}"
-    ))
+    let text = format!("{verdict}: {fit}, {iterations} iterations: {reason}");
+    say_beside(&[Some(path)], text)
 }

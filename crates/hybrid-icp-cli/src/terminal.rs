@@ -20,9 +20,9 @@ pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
     }
 }
 
-/// Prints a summary of an output file, to standard error if the file itself is standard output.
-pub(crate) fn say_of(output: &Path, text: impl Display) -> anyhow::Result<()> {
-    if output != Path::new("-") {
+/// Prints a summary, to standard error if one of the outputs is standard output.
+pub(crate) fn say_beside(outputs: &[Option<&Path>], text: impl Display) -> anyhow::Result<()> {
+    if !outputs.contains(&Some(Path::new("-"))) {
         return say(text);
     }
     let _ = writeln!(std::io::stderr().lock(), "{text}");

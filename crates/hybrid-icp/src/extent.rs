@@ -68,7 +68,7 @@ impl Extent {
     }
 
     /// Returns the same map without rotations around declared axes of symmetry.
-    fn scale(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
+    pub(crate) fn scale(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
         let mut scale = self.displacement(pose);
         for axis in &self.axes {
             let direction = (pose.rotation * axis).into_inner();

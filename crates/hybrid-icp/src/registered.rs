@@ -55,7 +55,7 @@ impl Registered {
         let least = WEAK * self.eigen.eigenvalues.max();
         let mut open = Vec::new();
         for index in 0..6 {
-            if self.eigen.eigenvalues[index] <= least {
+            if self.eigen.eigenvalues[index] < least {
                 let direction = self.unit * self.eigen.eigenvectors.column(index);
                 if is_open(&direction, extent, pose, mve, &mut score) {
                     self.eigen.eigenvalues[index] = 0.0;

@@ -130,7 +130,7 @@ impl SequentialEstimator {
     ///
     /// It also uses the error that all estimates share, and a gate on the Mahalanobis distance. A
     /// direction that no image determines, for example the rotation of a mug whose handle is
-    /// hidden, has a deviation of the object's radius. Otherwise as
+    /// hidden, has at least a deviation of the object's radius. Otherwise as
     /// [`SequentialEstimator::for_object`].
     ///
     /// Cost of a step: one more fit that keeps the pose, and up to two scores for each direction of
@@ -281,7 +281,7 @@ impl SequentialEstimator {
         }
     }
 
-    /// Returns the fuser, which does not know the directions that no image determines.
+    /// Returns the fuser. Its covariance leaves out the directions that no image determines.
     #[must_use]
     pub fn fuser(&self) -> &dyn Fuser {
         &*self.fuser

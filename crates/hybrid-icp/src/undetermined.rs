@@ -11,8 +11,8 @@ use crate::registered::{Registered, camera_from_center, is_open};
 
 /// The directions that no fused image of a static object determined.
 ///
-/// Covariances cannot hold them, because each image has its own error of the tilt. It turns the
-/// axis of an unknown rotation, so that the fused images seem to determine the rotation.
+/// The covariances of estimates do not keep them. Each image has an error of the tilt, which turns
+/// the axis of an unknown rotation, so that the fused images seem to determine the rotation.
 pub(crate) struct Undetermined {
     extent: Extent,
     /// Finds the information of an image at a pose, which it keeps.
@@ -21,8 +21,9 @@ pub(crate) struct Undetermined {
     ///
     /// They are displacements in the object's frame that move the surface by 1 m.
     fused: Option<Vec<Vector6<f64>>>,
-    /// Those that the latest image does not determine, and those of `fused` that are left then.
+    /// The directions that the latest image does not determine.
     latest: Vec<Vector6<f64>>,
+    /// Those of `fused` that the latest image does not determine either.
     left: Vec<Vector6<f64>>,
 }
 
@@ -63,7 +64,10 @@ impl Undetermined {
         let information = quality.and_then(|quality| quality.information());
         let mut registered = Registered::new(&information.unwrap_or_default(), &self.extent, pose);
         let mut score = |pose: &_| score.score(&mut workspace.context(problem), pose);
-        let open = registered.forget_open(&self.extent, pose, mve, &mut score);
+        let mut open = registered.forget_open(&self.extent, pose, mve, &mut score);
+        // Around a declared axis, all rotations are the same pose.
+        let scale = self.extent.scale(pose);
+        open.retain(|direction| (scale * direction).norm() > 0.1);
         let (back, turn) = (rotated(&pose.inverse()), rotated(pose));
         self.latest = open.iter().map(|direction| back * direction).collect();
         self.left = self.fused.clone().unwrap_or_default();

@@ -25,7 +25,8 @@ use crate::stage::stage_trait::Stage;
 ///
 /// [`Alternative::color_gap`] then has the margin of each alternative that is as good in depth.
 /// Without colors, or without a contrast, the result is that of the stage, bit for bit. A bound of
-/// the stage does not limit the choice.
+/// the stage does not limit the choice. Within a [`HypothesisSearch`](crate::HypothesisSearch), it
+/// only runs its stage: put it around the search.
 ///
 /// Cost: nothing without colors, or with a model of one color. Otherwise some 20 µs if depth leaves
 /// no choice, 1 ms if it does but the colors agree at the pose of the stage, and 2 to 12 ms if they

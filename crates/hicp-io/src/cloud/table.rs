@@ -12,6 +12,12 @@ pub(super) fn parse_text(reading: Reading<'_>, text: &str) -> Result<PointCloud,
     let lines = text.trim_start_matches('\u{feff}').lines().zip(1..);
     let lines = lines.filter(|(line, _)| !line.trim().is_empty());
     let separator = separator(lines.clone().map(|(line, _)| line));
+    let mut rows_of_cells = lines.clone().filter(|(line, _)| !is_comment(line));
+    let width = rows_of_cells.find_map(|(line, _)| {
+        let cells = cells(line, separator);
+        let numbers = cells.iter().filter(|cell| cell.parse::<f64>().is_ok());
+        (numbers.count() > 2).then_some(cells.len())
+    });
     let mut columns = [0, 1, 2, 3, 4, 5].map(Some);
     let mut named = false;
     let mut rows = Vec::new();
@@ -22,6 +28,7 @@ pub(super) fn parse_text(reading: Reading<'_>, text: &str) -> Result<PointCloud,
         // The columns may have names, in a comment or not. PTS files start with a count.
         if rows.is_empty()
             && let Some(names) = header(line, separator)
+            && width.is_none_or(|width| names.len() <= width)
         {
             let count = |wanted: &&&str| names.iter().filter(|name| name == *wanted).count();
             if let Some(twice) = NAMES.iter().find(|wanted| count(wanted) > 1) {
@@ -73,23 +80,23 @@ fn cells(line: &str, separator: Option<char>) -> Vec<&str> {
 
 /// Returns the character between the cells of a table, or `None` for white space.
 ///
-/// It is the one that splits the first lines into the most numbers, and then the most cells. A
-/// semicolon comes first, since the commas of such a table are those of its decimals.
+/// It is the one that splits the first lines into the most numbers, and then into rows of equal
+/// length. A semicolon comes first, since the commas of such a table are those of its decimals.
 fn separator<'a>(lines: impl Iterator<Item = &'a str>) -> Option<char> {
     let lines = lines.filter(|line| !is_comment(line)).take(20);
     let lines: Vec<&str> = lines.collect();
-    if lines.iter().any(|line| line.matches(';').count() > 1) {
+    let is_row = |line: &&str| line.matches(';').count() > 1 && header(line, Some(';')).is_none();
+    if lines.iter().any(is_row) {
         return Some(';');
     }
     let fit = |separator: &Option<char>| {
-        let cells: Vec<&str> = lines
-            .iter()
-            .flat_map(|line| cells(line, *separator))
-            .collect();
-        let numbers = cells.iter().filter(|cell| cell.parse::<f64>().is_ok());
-        (numbers.count(), cells.len())
+        let rows: Vec<_> = lines.iter().map(|line| cells(line, *separator)).collect();
+        let cells = rows.iter().flatten();
+        let numbers = cells.filter(|cell| cell.parse::<f64>().is_ok()).count();
+        (numbers, rows.iter().all(|row| row.len() == rows[0].len()))
     };
-    let separators = [None, Some(','), Some('\t')].into_iter();
+    // The last of several equal ones is taken.
+    let separators = [Some('\t'), Some(','), None].into_iter();
     separators.max_by_key(fit).flatten()
 }
 

@@ -38,7 +38,8 @@ pub use write::{write_obj, write_ply};
 ///
 /// - GLB and glTF: triangles, strips and fans of the default scene, with the transforms of its
 ///   nodes; also quantized and sparse. The unit of the format is the meter, and y is up; the axes
-///   stay. Draco and meshopt compression is refused. Buffers are read from files next to it. The
+///   stay. Draco and meshopt compression, skins, morphed shapes, and unknown extensions that a file
+///   requires are refused. Buffers are read from files next to it. The
 ///   color is the base color of the materials, times their textures or `COLOR_0`.
 /// - OBJ: relative indices, continued lines, comments after a record and any line ending are
 ///   accepted. Vertices that no face uses are dropped. The color is `map_Kd` or `Kd` of the

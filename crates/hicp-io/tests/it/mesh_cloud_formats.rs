@@ -238,6 +238,9 @@ fn tables_have_one_separator() {
         "2\n1 2 3\n1 2 nan\n",
         "//x, y, z\n  1  2\t 3 # far\n1 2 nan\n",
         "1,\t2,\t3\n1,\t,\t3\n",
+        "\t1\t\t2\t\t3\n\t1\t\t2\t\tnan\n",
+        "X;Y;Z\n1 2 3\n1 2 nan\n",
+        "# Columns: x y z r g b\n1 2 3 4 5 6\n1 2 nan 4 5 6\n",
     ] {
         let cloud = read_cloud(folder.write("a.csv", text), LengthUnit::Meters).unwrap();
         assert_eq!(cloud.points, [[1.0, 2.0, 3.0].into()], "{text}");
@@ -284,6 +287,10 @@ fn files_that_are_no_cloud_are_refused() {
             "found \"0,6\" in the column nx",
         ),
         (b"0,1 0,2 0,3\n".to_vec(), "in the column y"),
+        (
+            b"x [m],y [m],z [m],a\n1,2,3,4\n".to_vec(),
+            "line 1: found \"x [m]\" in the column x",
+        ),
         (
             b"i,x,y,z\n0,1,2,3\n1,2\n".to_vec(),
             "line 3: found \"1,2\", without a column y",

@@ -26,7 +26,7 @@ pub(super) fn length(
         ("meters", Length::Meters),
     ];
     let unit = p.word("unit", &units, "unit of the length")?;
-    if p.has("unit") && !p.has(name) {
+    if matches!(unit(0.0), Length::Meters(_)) && !p.has(name) {
         return Err(p.refuse(name, "a length in `unit`".to_owned()));
     }
     Ok(unit(length))

@@ -1,6 +1,7 @@
 //! The options of the commands that follow one object through a scene.
 
 use std::collections::BTreeSet;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Error, bail};
@@ -15,7 +16,7 @@ use super::models;
 use super::options::DatasetOptions;
 use crate::limits::limits;
 use crate::outputs::Files;
-use crate::terminal::warn;
+use crate::terminal::{say_beside, warn};
 
 /// The options of a command that follows one object through a scene.
 #[derive(Debug, Args)]
@@ -154,6 +155,11 @@ impl FollowOptions {
                 rows.len()
             ),
         }
+    }
+
+    /// Prints a summary.
+    pub(super) fn say(&self, text: impl Display) -> anyhow::Result<()> {
+        say_beside(&[Some(&self.output), self.results.as_deref()], text)
     }
 
     /// Writes the lines and, if there is a file for them, the rows.

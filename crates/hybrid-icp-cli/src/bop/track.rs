@@ -17,7 +17,7 @@ use super::statistics::{count, median};
 use super::{faults, models};
 use crate::options::positive;
 use crate::pose_json::add_pose;
-use crate::terminal::{counted, progress_bar, say_of, warn};
+use crate::terminal::{counted, progress_bar, warn};
 
 /// Track a moving object through the images of a scene, without masks.
 ///
@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         counted(lines.len(), "image"),
         summarize(&lines),
     );
-    say_of(&follow.output, text)?;
+    follow.say(text)?;
     let fps = arguments.fps;
     if fps > MAX_FPS {
         warn(format_args!(

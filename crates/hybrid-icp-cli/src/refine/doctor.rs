@@ -13,7 +13,7 @@ use super::inputs::{Inputs, Read};
 use super::warnings::about_inputs;
 use crate::limits::limits;
 use crate::outputs::{Files, write_json};
-use crate::terminal::{check_stdout, say, warn};
+use crate::terminal::{check_stdout, say, say_beside, warn};
 
 /// Name what is wrong with the inputs of a refinement, and the fix.
 ///
@@ -161,7 +161,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None => {}
     }
     warnings.iter().for_each(warn);
-    say(text(&faults, diagnosis.score))
+    say_beside(
+        &[arguments.output.as_deref()],
+        text(&faults, diagnosis.score),
+    )
 }
 
 impl Named {

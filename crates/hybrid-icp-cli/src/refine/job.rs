@@ -13,7 +13,7 @@ use super::trace::{self, TraceLines};
 use super::warnings;
 use crate::choice::PipelineArguments;
 use crate::outputs::{Files, check_png, write_json, write_picture};
-use crate::terminal::{check_stdout, say, say_of, warn};
+use crate::terminal::{check_stdout, say, say_beside, warn};
 
 /// The pipeline and the outputs.
 #[derive(Debug, Args)]
@@ -132,7 +132,11 @@ impl JobOptions {
         }
         report.warnings.iter().for_each(warn);
         match &self.output {
-            Some(output) => say_of(output, summary),
+            Some(output) => {
+                let others = [&self.alternatives, &self.overlay, &self.trace];
+                let [alternatives, overlay, trace] = others.map(Option::as_deref);
+                say_beside(&[Some(output), alternatives, overlay, trace], summary)
+            }
             None => say(serde_json::to_string_pretty(&report)?),
         }
     }

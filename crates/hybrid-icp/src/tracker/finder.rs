@@ -1,4 +1,4 @@
-//! The search for a lost object.
+//! The search for a lost object, or for its rotation.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

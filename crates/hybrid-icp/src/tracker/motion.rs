@@ -84,8 +84,10 @@ impl Motion {
     }
 
     /// Returns the axis of the least certain displacement and a point on it, if it is a rotation.
+    ///
+    /// Objects with declared axes of symmetry have none.
     pub(super) fn open_axis(&self, extent: &Extent) -> Option<(UnitVector3<f64>, Point3<f64>)> {
-        let scale = extent.displacement(&self.pose);
+        let scale = extent.scale(&self.pose);
         let eigen = eigen6(&(scale * self.of_pose * scale.transpose()))?;
         let least = eigen.eigenvectors.column(eigen.eigenvalues.imax());
         if least.fixed_rows::<3>(3).norm() < 0.7 {

@@ -127,7 +127,7 @@ impl FoundPoses {
         Some(self.poses.remove(next))
     }
 
-    /// Lists the poses that differ from the returned one, instead of those of an inner search.
+    /// Lists the poses that differ from the returned one.
     pub(crate) fn list_alternatives(
         &self,
         returned: &Isometry3<f64>,
@@ -135,7 +135,6 @@ impl FoundPoses {
         distinct: &Distinct,
         alternatives: &mut Vec<Alternative>,
     ) {
-        alternatives.clear();
         alternatives.reserve(self.poses.len());
         for found in &self.poses {
             let other = found.outcome.camera_from_object;

@@ -23,10 +23,13 @@ use crate::limits::Limit;
 use crate::number::whole;
 
 /// Parts of the names of extensions that leave shapes as they are, or that readers of parts handle.
-const KNOWN_EXTENSIONS: [&str; 6] = [
+const KNOWN_EXTENSIONS: [&str; 9] = [
     "_materials_",
     "_texture_",
     "_lights_",
+    "_xmp",
+    "_metadata",
+    "VRM",
     "KHR_mesh_quantization",
     "draco",
     "meshopt",

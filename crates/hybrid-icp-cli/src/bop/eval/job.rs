@@ -17,7 +17,7 @@ use crate::bop::{faults, models, targets};
 use crate::limits::limits;
 use crate::options::positive;
 use crate::outputs::write_json;
-use crate::terminal::{progress_bar, say, warn};
+use crate::terminal::{progress_bar, say_beside, warn};
 
 /// The benchmark's visibility tolerance in millimeters.
 pub(crate) const DELTA_MM: f64 = 15.0;
@@ -156,7 +156,8 @@ impl EvalJob {
         }
         let is_empty = report.all.targets == 0;
         if !is_empty && !self.quiet {
-            say(report.table())?;
+            let outputs = [&self.json, &self.errors].map(Option::as_deref);
+            say_beside(&outputs, report.table())?;
         }
         let faults = judged.iter().flat_map(|image| &image.faults);
         if let Some(damaged) = faults::report(faults, models.broken.values()) {

@@ -7,6 +7,7 @@ use anyhow::bail;
 use hicp_bop::{DatasetRefiner, FrameResult, FrameRows, Scenes, frames_of};
 use hicp_io::RowLog;
 use hicp_io::bop::ResultRow;
+use hybrid_icp::Preset;
 use rayon::prelude::*;
 
 use super::job::RefineJob;
@@ -15,7 +16,7 @@ use super::{journal, rows_file, settings, warnings};
 use crate::bop::models;
 use crate::interrupt;
 use crate::outputs::journal_of;
-use crate::terminal::{counted, progress_bar, say_of, warn};
+use crate::terminal::{counted, progress_bar, say_beside, warn};
 
 impl RefineJob<'_> {
     /// Refines the rows, writes the output and reports what happened.
@@ -66,7 +67,9 @@ impl RefineJob<'_> {
         for result in &results {
             result.enter(&mut rows, self.rescore, self.timed);
         }
-        if self.dataset.has_color() {
+        let preset: Result<Preset, _> = self.pipeline.name.parse();
+        let compares = self.estimates() || preset.map_or(true, |preset| preset == Preset::Color);
+        if compares && self.dataset.has_color() {
             uncolored_frames(&shared, &frames).iter().for_each(warn);
         }
         let poses = (!self.estimates()).then_some("that --results is in mm");
@@ -113,7 +116,7 @@ impl RefineJob<'_> {
         }
         text.push_str(&summary(self, &results, &shared.models, &distrust));
         // Warnings go to standard error even if standard output fails.
-        let said = say_of(self.output, text);
+        let said = say_beside(&[Some(self.output), self.rows], text);
         images.iter().for_each(warn);
         if self.distrusts {
             distrust.warn(self);
@@ -175,6 +178,6 @@ fn uncolored_frames(shared: &DatasetRefiner, frames: &[FrameRows]) -> Option<Str
     let count = frames.iter().filter(without).count();
     (count > 0).then(|| {
         let of = counted(frames.len(), "frame");
-        format!("{count} of {of} have no image in rgb/: their rows are refined by depth alone")
+        format!("without an image in rgb/, the rows of {count} of {of} are refined by depth alone")
     })
 }

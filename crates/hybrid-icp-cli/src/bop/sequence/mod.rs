@@ -25,7 +25,7 @@ use super::statistics::{count, median};
 use super::{faults, models};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
-use crate::terminal::{counted, progress_bar, say_of, warn};
+use crate::terminal::{counted, progress_bar, warn};
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
 ///
@@ -141,7 +141,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         start.elapsed().as_secs_f64(),
         summarize(&lines),
     );
-    say_of(&follow.output, text)?;
+    follow.say(text)?;
     let diameter = models::wrong_diameters(&models, &dataset.models_info_path()?).remove(&object);
     diameter.iter().for_each(warn);
     let (im_id, warnings) = tracker.warnings.unwrap_or_default();

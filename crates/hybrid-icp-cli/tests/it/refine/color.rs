@@ -107,7 +107,11 @@ fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
     let rgb = world.scene(3).join("rgb");
     world.create_dir(&rgb);
     let (missing, _) = world.refine(&rows, "--models models_color");
-    missing.warns(&["frames have no image in rgb/: their rows are refined by depth alone"]);
+    missing.warns(&[
+        "without an image in rgb/",
+        "frame",
+        "refined by depth alone",
+    ]);
     world.write(rgb.join("000040.png"), "damaged");
     let (damaged, _) = world.refine(&rows, "--models models_color");
     let parts = ["rgb/000040.png", "PNG, JPEG or TIFF", "by depth alone"];
