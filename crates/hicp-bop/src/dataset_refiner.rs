@@ -69,6 +69,7 @@ impl DatasetRefiner {
         let objects = indices.iter().map(|index| rows[*index].obj_id);
         if objects.into_iter().any(|obj_id| self.is_colored(obj_id)) {
             let unread = image.read_color().err();
+            result.uncolored = unread.is_none() && image.color.is_none();
             result.faults.extend(unread.map(|fault| Fault {
                 text: format!(
                     "{}; the rows of the image are refined by depth alone",

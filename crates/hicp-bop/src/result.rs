@@ -69,6 +69,9 @@ pub struct FrameResult {
     pub rows: Vec<RowResult>,
     /// Time spent on these rows in seconds; `None` if no row reached the pipeline.
     pub seconds: Option<f64>,
+    /// `true` if a model has colors, and there is no color image.
+    #[serde(default)]
+    pub uncolored: bool,
     /// Files that were missing or damaged.
     pub faults: Vec<Fault>,
     /// Warnings about the inputs ([`hybrid_icp::warnings`]) by object, from the first row of each

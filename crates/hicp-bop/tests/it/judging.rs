@@ -67,6 +67,7 @@ fn results_are_stored_bit_for_bit() {
             row(RowStatus::NoMask, None, None),
         ],
         seconds: Some(0.7 / 3.0),
+        uncolored: false,
         faults: vec![hicp_bop::Fault::damaged("a\n\"b\"".to_owned())],
         warnings: vec![(
             7,

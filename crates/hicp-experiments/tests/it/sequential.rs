@@ -194,6 +194,7 @@ fn a_field_is_changed_by_name() {
     assert_eq!(changed.without_pairs, WithoutPairs::Nothing);
     for (change, part) in [
         ("speed=1", "speed: found no such field"),
+        ("objects=[]", "objects: found a field that the command sets"),
         ("speed_m_s=fast", "speed_m_s"),
         ("speed_m_s=-1", "speed_m_s"),
         ("depth_noise=d435", "a noise"),

@@ -23,7 +23,8 @@ use crate::stage::stage_trait::Stage;
 /// 3. [`ColorAgreement`] decides. Another pose replaces that of the stage only if its score of the
 ///    depth is nearly as good, and its colors agree clearly better.
 ///
-/// [`Alternative::color_gap`] then has the margin of each alternative that is as good in depth.
+/// [`Alternative::color_gap`] then has the margin of each alternative that is nearly as good in
+/// depth.
 /// Without colors, or without a contrast, the result is that of the stage, bit for bit. A bound of
 /// the stage does not limit the choice. Within a [`HypothesisSearch`](crate::HypothesisSearch), it
 /// only runs its stage: put it around the search.

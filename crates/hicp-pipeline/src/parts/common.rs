@@ -41,7 +41,7 @@ pub(super) fn stride(
     let points = p.count("points", 1, points, meaning)?;
     let pixels = p.count("pixels", 0, 0, "spacing of the grid instead, if not 0")?;
     if pixels > 0 && p.has("points") {
-        return Err(p.refuse("points", "no points next to pixels".to_owned()));
+        return Err(p.refuse("points", "either points or pixels".to_owned()));
     }
     Ok(match pixels {
         0 => Stride::AboutPoints(points),

@@ -8,10 +8,12 @@ use hicp_tests::tabletop::Tabletop;
 use hicp_tests::ycbv;
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Translation3, TriMesh,
-    UnitQuaternion, Vector3, se3,
+    se3,
 };
-use hybrid_icp::score::{ModelPoints, mssd};
+use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refiner, TrackState, Tracked, Tracker, TrackerConfig};
+
+use super::hidden_handle::handle_behind;
 
 const SECONDS: f64 = 1.0 / 30.0;
 
@@ -140,92 +142,11 @@ fn a_hidden_object_is_lost_and_found_again() {
     }
 }
 
-#[test]
-fn a_mug_that_turns_with_its_handle_behind_is_doubtful() {
-    let model = Household::Mug.model().unwrap();
-    // The handle is on the axis x of the object, and points away from the camera at 0.
-    let upright =
-        UnitQuaternion::from_basis_unchecked(&[Vector3::z(), -Vector3::x(), -Vector3::y()]);
-    let pose = |degrees: f64| {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians());
-        Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.6), upright * turn)
-    };
-    let points: Vec<_> = model.samples().iter().map(|s| s.point).collect();
-    let mut tracker = Tracker::new(model.clone(), camera(), TrackerConfig::default());
-    tracker.start(&pose(-30.0));
-    let mut states = Vec::new();
-    for frame in 0..21 {
-        let truth = pose(3.0 * f64::from(frame) - 30.0);
-        let (depth, _) = hicp_tests::render(&model, &camera(), &truth);
-        let tracked = tracker.step(depth, SECONDS, None).unwrap();
-        let off = mssd(&tracked.camera_from_object, &truth, &points, &[]) / model.diameter();
-        let sure = tracked.state == TrackState::Tracking;
-        assert!(!sure || off < 0.1, "{frame}: {off}");
-        states.push(tracked.state);
-    }
-    assert_eq!(states[20], TrackState::Doubtful);
-}
-
-/// Images that do not show the handle must not add up to a known rotation.
-#[test]
-fn a_slow_mug_that_hides_its_handle_stays_doubtful() {
-    let model = Household::Mug.model().unwrap();
-    let upright =
-        UnitQuaternion::from_basis_unchecked(&[Vector3::z(), -Vector3::x(), -Vector3::y()]);
-    let truth = Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.6), upright);
-    let config = TrackerConfig {
-        meters_per_second: 0.02,
-        degrees_per_second: 1.0,
-        ..TrackerConfig::default()
-    };
-    let mut tracker = Tracker::new(model.clone(), camera(), config);
-    tracker.start(&(truth * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.4)));
-    let depth = Arc::new(hicp_tests::render(&model, &camera(), &truth).0);
-    for frame in 0..300 {
-        let tracked = tracker.step(Arc::clone(&depth), SECONDS, None).unwrap();
-        let deviation = tracked.deviation_meters / model.diameter();
-        let place = format!("{frame}: {deviation} d");
-        assert_eq!(tracked.state, TrackState::Doubtful, "{place}");
-    }
-}
-
-/// The local registration does not find the handle, because it is far from that of the pose.
-#[test]
-fn a_handle_that_comes_into_view_ends_the_doubt() {
-    let model = Household::Mug.model().unwrap();
-    let upright =
-        UnitQuaternion::from_basis_unchecked(&[Vector3::z(), -Vector3::x(), -Vector3::y()]);
-    let tilted = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.4) * upright;
-    let pose = |angle| {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
-        Isometry3::from_parts(Translation3::new(0.0, 0.0, 0.6), tilted * turn)
-    };
-    for direction in [-1.0, 1.0] {
-        let mut tracker = Tracker::new(model.clone(), camera(), TrackerConfig::default());
-        tracker.start(&pose(-0.6 * direction));
-        for frame in 0..75 {
-            let truth = pose(direction * 0.03 * f64::from(frame));
-            let depth = hicp_tests::render(&model, &camera(), &truth).0;
-            let tracked = tracker.step(depth, SECONDS, None).unwrap();
-            let off = se3::pose_distance(&tracked.camera_from_object, &truth).0;
-            let expected = if off < 0.1 {
-                TrackState::Tracking
-            } else {
-                TrackState::Doubtful
-            };
-            assert_eq!(tracked.state, expected, "{frame}: {off}");
-            assert!(off < 0.1 || frame < 50, "{frame}: {off}");
-        }
-    }
-}
-
 /// The guess for a lost object starts from the pose that was followed last.
 #[test]
 fn an_object_that_was_found_and_followed_is_not_guessed_where_it_was_lost_before() {
     let model = Household::Mug.model().unwrap();
-    let upright =
-        UnitQuaternion::from_basis_unchecked(&[Vector3::z(), -Vector3::x(), -Vector3::y()]);
-    let pose = |x| Isometry3::from_parts(Translation3::new(x, 0.0, 0.7), upright);
+    let pose = |x| Isometry3::from_parts(Translation3::new(x, 0.0, 0.7), handle_behind());
     let nothing = Arc::new(DepthImage::from_meters(320, 240, vec![0.0; 320 * 240]).unwrap());
     let mut tracker = Tracker::new(model.clone(), camera(), TrackerConfig::default());
     tracker.start(&pose(-0.15));

@@ -174,7 +174,7 @@ fn messages_name_the_line_the_field_and_the_expected_value() {
                 "\"all-samples\"",
                 "{ type = \"visible-surface\", points = 9, pixels = 2 }",
             ),
-            "my.toml:2: selection.points: found 9, expected no points next to pixels",
+            "my.toml:2: selection.points: found 9, expected either points or pixels",
         ),
         (
             icp.replace(

@@ -69,8 +69,12 @@ impl RefineJob<'_> {
         }
         let preset: Result<Preset, _> = self.pipeline.name.parse();
         let compares = self.estimates() || preset.map_or(true, |preset| preset == Preset::Color);
-        if compares && self.dataset.has_color() {
-            uncolored_frames(&shared, &frames).iter().for_each(warn);
+        let count = results.iter().filter(|result| result.uncolored).count();
+        if count > 0 && compares && self.dataset.has_color() {
+            let of = counted(results.len(), "frame");
+            warn(format_args!(
+                "without an image in rgb/, the rows of {count} of {of} are refined by depth alone"
+            ));
         }
         let poses = (!self.estimates()).then_some("that --results is in mm");
         let images = warnings::about_images(&results, &rows, poses);
@@ -164,20 +168,4 @@ impl RefineJob<'_> {
         progress.finish_and_clear();
         ran
     }
-}
-
-/// Returns a warning if colors are used, and some images have none.
-fn uncolored_frames(shared: &DatasetRefiner, frames: &[FrameRows]) -> Option<String> {
-    let mut models = shared.models.by_id.values();
-    models.find(|model| model.mesh().color().is_some())?;
-    let without = |frame: &&FrameRows| {
-        let (scene_id, im_id) = frame.0;
-        let scene = shared.scenes.get(scene_id);
-        scene.is_ok_and(|scene| scene.color_path(im_id).is_none())
-    };
-    let count = frames.iter().filter(without).count();
-    (count > 0).then(|| {
-        let of = counted(frames.len(), "frame");
-        format!("without an image in rgb/, the rows of {count} of {of} are refined by depth alone")
-    })
 }
