@@ -3,10 +3,11 @@
 //! Run `cargo run --release -p hicp-tests --example color [CASES] [SET] [EVIDENCE] [WORDS]`.
 //!
 //! `SET` is `tuning` or `test`. With the word `plain`, the objects have no texture. With `refine`,
-//! poses are not estimated from the mask alone. Times are those of the processor.
-//! `EVIDENCE` is `right`, or a fault of the color image: `other` (of another scene), `swapped` (red
-//! and blue), `shadow`, `shifted` (by 5 pixels) or `overexposed`. A pose fails if its MSSD is above
-//! a tenth of the diameter; no symmetry is declared. Half of the objects are symmetric in depth.
+//! poses are not estimated from the mask alone. Times are those of the processor. `EVIDENCE` is
+//! `right`, or a fault of the color image: `noisy` (50 gray levels), `other` (of another scene),
+//! `swapped` (red and blue), `shadow`, `shifted` (by 5 pixels) or `overexposed`. A pose fails if
+//! its MSSD is above a tenth of the diameter; no symmetry is declared. Half of the objects are
+//! symmetric in depth.
 
 use hicp_sim::{Lighting, Texture, stream};
 use hicp_tests::painted::Painted;
@@ -16,8 +17,9 @@ use hybrid_icp::core::{ColorImage, Isometry3, Observation, PixelRegion};
 use hybrid_icp::icp::Alternative;
 use hybrid_icp::{Preset, Refinement, Refiner, presets};
 
-const FAULTS: [&str; 6] = [
+const FAULTS: [&str; 7] = [
     "right",
+    "noisy",
     "other",
     "swapped",
     "shadow",
@@ -73,6 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let mut lighting = Lighting::draw(&mut random);
             match fault.as_str() {
                 "shadow" => lighting.shadow = 0.3,
+                "noisy" => lighting.noise = 50.0,
                 "overexposed" => lighting.exposure = 5.0,
                 _ => {}
             }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use hicp_sim::{Household, Lighting, Texture, stream};
 use hicp_tests::painted::Painted;
-use hicp_tests::tabletop::{MaskKind, Seen};
+use hicp_tests::tabletop::{MaskKind, Seen, Tabletop};
 use hybrid_icp::core::{
     ColorImage, Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3,
     Problem, RenderCache, RenderedView, Renderer, SurfaceColor, TexturedTriangle, TriMesh, Vector3,
@@ -245,6 +245,44 @@ fn color_turns_slender_objects_and_ones_with_much_noise() {
         let pose = &found.outcome.camera_from_object;
         let error = points.mssd(pose, &seen.truth) / points.diameter();
         assert!(error < 0.05, "{}: {error}", object.name());
+    }
+}
+
+/// Returns a mesh whose distance from the z-axis waves by a length in meters, as if it were dented.
+fn dented(mesh: &TriMesh, meters: f32) -> TriMesh {
+    let vertices = mesh.vertices().iter().map(|p| {
+        let (angle, height) = (p.y.atan2(p.x), 30.0 * p.z);
+        let wave = (2.0 * angle + height).cos() + (3.0 * angle - height).cos();
+        let factor = 1.0 + 0.5 * meters * wave / p.x.hypot(p.y).max(0.02);
+        Point3::new(factor * p.x, factor * p.y, p.z)
+    });
+    TriMesh::new(vertices.collect(), mesh.triangles().to_vec()).unwrap()
+}
+
+#[test]
+fn color_turns_dented_objects() {
+    let plain = Household::Bottle.model().unwrap();
+    let mesh = dented(plain.mesh(), 0.002);
+    let mesh = Texture::Text.paint(&mut stream(1, &["paint"], 0), mesh);
+    let painted = Painted {
+        scenes: Tabletop::of(vec![("dented bottle".into(), Model::new(mesh.unwrap()))]),
+        motions: vec![plain.symmetries().motions()],
+    };
+    let scenes = (0..).flat_map(|seed| painted.scenes.scene(seed).unwrap());
+    let model = &painted.scenes.objects[0].1;
+    let points = ModelPoints::new(model);
+    let (mut light, mut color) = (lighting(), Refiner::preset(Preset::Color));
+    // Such a noise hides the colors from the ranks, but not from the means over cells.
+    light.noise = 50.0;
+    for seen in scenes.filter(|seen| seen.visible_share > 0.9).take(3) {
+        let observation = painted.observe(&seen, MaskKind::Exact, &light, 5).unwrap();
+        for degrees in [70.0_f64, 160.0, 250.0] {
+            let turn = Isometry3::rotation(Vector3::z() * degrees.to_radians());
+            let found = color.refine(model, &observation, &(seen.truth * turn));
+            let pose = &found.outcome.camera_from_object;
+            let error = points.mssd(pose, &seen.truth) / points.diameter();
+            assert!(error < 0.05, "{degrees}°: {error}");
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Stages: generic ICP, and stages composed of stages.
 
 pub(crate) mod anderson;
-pub(crate) mod color_choice;
+pub(crate) mod color;
 pub(crate) mod compose;
 pub(crate) mod descent;
 pub(crate) mod guard;
@@ -12,7 +12,7 @@ pub(crate) mod search;
 pub(crate) mod stage_trait;
 
 pub use anderson::Anderson;
-pub use color_choice::ColorChoice;
+pub use color::choice::ColorChoice;
 pub use compose::{Cascade, Repeat};
 pub use descent::Descent;
 pub use guard::{Guard, KeepBest};

@@ -23,6 +23,9 @@ const NEAR: f64 = 0.05;
 /// Largest distance of a surface of revolution from itself after a rotation, as a share of the
 /// diameter.
 const SMOOTH: f64 = 0.015;
+/// Information, relative to the best known direction, up to which a rotation stays as it is: dents
+/// of a surface of revolution determine a rotation around its axis, but it may be seen at any.
+const DENTED: f64 = 0.02;
 /// Rotation by which the registration of a surface of revolution may change a motion, radians.
 const SNAPPED: f64 = 0.15;
 /// Smallest rotation that determines an axis, radians.
@@ -83,7 +86,11 @@ impl Turns {
             },
             association: NearestNeighbor::default(),
             filter: MaxDistance::diameters(NEAR),
-            metric: Conditioned::<PointToPlane>::default(),
+            metric: Conditioned {
+                metric: PointToPlane,
+                threshold: DENTED,
+                ..Conditioned::default()
+            },
             stop: (Convergence::default(), IterationLimit(15)),
         };
         let mut workspace = Workspace::new(NoRenderer);

@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use hicp_core::{Isometry3, Model, Observation, Problem, se3};
-use hicp_score::{ColorAgreement, ColorEvidence, SampledColor, Score};
+use hicp_score::{ColorAgreement, SampledColor, Score};
 
 use crate::alternative::Alternative;
 use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
+use crate::stage::color::tried::{Measured, Tried};
 use crate::stage::search::distinct::Distinct;
 use crate::stage::search::turns::Turns;
 use crate::stage::stage_trait::Stage;
@@ -20,11 +21,14 @@ use crate::stage::stage_trait::Stage;
 /// 2. They are ranked by the colors of samples, and the best few are polished. A polish with a
 ///    [`Photometric`](hicp_metric::Photometric) metric also finds the rotation that the depth does
 ///    not determine.
-/// 3. [`ColorAgreement`] decides. Another pose replaces that of the stage only if its score of the
-///    depth is nearly as good, and its colors agree clearly better.
+/// 3. If the colors agree only roughly, [`ColorAgreement`] is compared at the neighbors of the pose
+///    of the stage and of the best other one, and the best neighbor is polished.
+/// 4. [`ColorAgreement`] decides. Another pose replaces that of the stage only if its score of the
+///    depth is nearly as good, and its colors agree clearly better than near the pose of the stage.
 ///
 /// [`Alternative::color_gap`] then has the margin of each alternative that is nearly as good in
 /// depth.
+///
 /// Without colors, or without a contrast, the result is that of the stage, bit for bit. A bound of
 /// the stage does not limit the choice. Within a [`HypothesisSearch`](crate::HypothesisSearch), it
 /// only runs its stage: put it around the search.
@@ -55,30 +59,16 @@ pub struct ColorChoice<S, P, C> {
 
 /// Number of alternatives that take part.
 const ALTERNATIVES: usize = 4;
-/// Correlation at which no other pose is tried.
-const SURE: f64 = 0.8;
 /// Correlation at which a pose is not even polished.
 const PERFECT: f64 = 0.95;
-/// Correlation that a single cell might have by chance; it falls with the root of their number.
-const CHANCE: f64 = 3.5;
-/// Share of that correlation by which another pose must beat that of the stage.
-const GAIN: f64 = 0.7;
-/// Share of the gain that suffices for a pose that is nearly the same.
-const SMALL_MOVE: f64 = 0.1;
 /// Share of the depth's score that another pose may add to it.
 const TOLERANCE: f64 = 0.2;
 /// Largest MSSD of a base from a pose that is ranked already, as a share of the diameter.
 const SAME_BASE: f64 = 0.04;
 /// Number of poses that are polished.
 const POLISHED: usize = 3;
-
-/// A pose, its colors, and its score of the depth.
-#[derive(Clone, Copy, Debug)]
-struct Chosen {
-    color: ColorEvidence,
-    score: f64,
-    outcome: Outcome,
-}
+/// Largest number of candidates near a pose whose colors are compared.
+const NEARBY: usize = 12;
 
 impl<S, P, C> ColorChoice<S, P, C> {
     /// Creates the stage with the default conditions.
@@ -142,19 +132,14 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         problem: &Problem<'_>,
         outcome: Outcome,
         session: &mut Session<'_>,
-    ) -> Chosen {
+    ) -> Measured {
         let mut context = session.context(problem);
         let pose = &outcome.camera_from_object;
-        Chosen {
+        Measured {
             color: self.agreement.measure(&mut context, pose),
             score: self.score.score(&mut context, pose),
             outcome,
         }
-    }
-
-    /// Returns whether colors are evidence for a pose.
-    fn agrees(&self, color: &ColorEvidence) -> bool {
-        color.is_telling() && color.correlation >= self.least_correlation.max(by_chance(color))
     }
 
     /// Lets color choose between the pose of an outcome and others that explain the depth as well.
@@ -172,8 +157,15 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         }
         let first = self.measure(problem, outcome, session);
         self.ranked.clear();
+        let mut tried = Tried {
+            distinct,
+            least_correlation: self.least_correlation,
+            min_gain: self.min_gain,
+            first,
+            others: Vec::new(),
+        };
         let mut ranked = &candidates[..];
-        if self.agrees(&first.color) && first.color.correlation > SURE {
+        if tried.is_sure() {
             // Only the pose itself is left to polish.
             ranked = &candidates[..usize::from(first.color.correlation < PERFECT)];
         }
@@ -181,53 +173,91 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             let score = self.color.score(&mut session.context(problem), pose);
             insert(&mut self.ranked, (score, *pose), distinct);
         }
-        let most = (1.0 + TOLERANCE) * first.score + self.tolerance;
-        let ranked = std::mem::take(&mut self.ranked);
-        let (mut chosen, mut tried) = (first, vec![first]);
         let mut iterations = outcome.iterations;
+        let ranked = std::mem::take(&mut self.ranked);
         for (_, start) in &ranked {
-            let mut polished = self.polish.run(problem, start, session);
-            polished.verdict = Verdict::Refined;
-            iterations += polished.iterations;
-            let found = self.measure(problem, polished, session);
-            if found.score > most || !found.color.is_telling() {
-                continue;
-            }
-            tried.push(found);
-            let other = distinct.apart(&found.outcome.camera_from_object, &pose);
-            let gain = self.min_gain.max(GAIN * by_chance(&found.color));
-            let gain = if other { gain } else { SMALL_MOVE * gain };
-            if self.agrees(&found.color)
-                && found.color.correlation > first.color.correlation + gain
-                && found.color.correlation > chosen.color.correlation
-            {
-                chosen = found;
-            }
-            if chosen.color.correlation > SURE {
+            iterations += self.polish(problem, start, &mut tried, session);
+            if tried.is_sure() {
                 break;
             }
         }
         self.ranked = ranked;
-        if !tried.iter().any(|tried| tried.color.is_telling()) {
+        // The ranks are rough, and a polish moves little.
+        for apart in [false, true] {
+            let best = if apart {
+                tried.other()
+            } else {
+                Some(tried.own())
+            };
+            if let Some(best) = best.filter(|_| !tried.is_sure())
+                && let Some(start) = self.nearby(problem, best, (&candidates, distinct), session)
+            {
+                iterations += self.polish(problem, &start, &mut tried, session);
+            }
+        }
+        if !tried.all().any(|tried| tried.color.is_telling()) {
             return outcome;
         }
-        chosen.outcome.iterations = iterations;
-        self.list(problem, distinct, (&chosen, &tried), session);
-        chosen.outcome
+        let chosen = *tried.other().unwrap_or(tried.own());
+        self.list(problem, &chosen, &tried, session);
+        Outcome {
+            iterations,
+            ..chosen.outcome
+        }
+    }
+
+    /// Polishes a pose, and adds it to those tried if it explains the depth.
+    ///
+    /// Returns the number of iterations.
+    fn polish(
+        &mut self,
+        problem: &Problem<'_>,
+        start: &Isometry3<f64>,
+        tried: &mut Tried<'_>,
+        session: &mut Session<'_>,
+    ) -> usize {
+        let mut polished = self.polish.run(problem, start, session);
+        polished.verdict = Verdict::Refined;
+        let found = self.measure(problem, polished, session);
+        let most = (1.0 + TOLERANCE) * tried.first.score + self.tolerance;
+        if found.score <= most && found.color.is_telling() {
+            tried.others.push(found);
+        }
+        polished.iterations
+    }
+
+    /// Returns the candidate near a pose whose colors agree best, if they agree better there.
+    fn nearby(
+        &mut self,
+        problem: &Problem<'_>,
+        from: &Measured,
+        (candidates, distinct): (&[Isometry3<f64>], &Distinct),
+        session: &mut Session<'_>,
+    ) -> Option<Isometry3<f64>> {
+        let near = |other: &&Isometry3<f64>| !distinct.apart(other, from.pose());
+        let mut context = session.context(problem);
+        let mut best = (from.color.correlation, None);
+        for pose in candidates.iter().filter(near).take(NEARBY) {
+            let color = self.agreement.measure(&mut context, pose);
+            if color.correlation > best.0 {
+                best = (color.correlation, Some(*pose));
+            }
+        }
+        best.1
     }
 
     /// Lists the alternatives to the chosen pose, those that color does not tell apart first.
     fn list(
         &mut self,
         problem: &Problem<'_>,
-        distinct: &Distinct,
-        (chosen, tried): (&Chosen, &[Chosen]),
+        chosen: &Measured,
+        tried: &Tried<'_>,
         session: &mut Session<'_>,
     ) {
-        let pose = &chosen.outcome.camera_from_object;
+        let (pose, distinct) = (chosen.pose(), tried.distinct);
         let mut list = std::mem::take(&mut session.workspace.alternatives);
-        for other in tried {
-            let (other, score) = (other.outcome.camera_from_object, other.score);
+        for other in tried.all() {
+            let (other, score) = (*other.pose(), other.score);
             let same = |old: &Alternative| !distinct.apart(&old.camera_from_object, &other);
             if !list.iter().any(same) {
                 list.push(Alternative {
@@ -246,10 +276,8 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             alternative.gap = alternative.score - chosen.score;
             alternative.mssd_meters = distinct.mssd(other, pose);
             alternative.rotation_degrees = distinct.degrees(other, pose);
-            if alternative.gap < self.tolerance && self.agrees(&chosen.color) {
-                let known = tried
-                    .iter()
-                    .find(|tried| tried.outcome.camera_from_object == *other);
+            if alternative.gap < self.tolerance && tried.agrees(&chosen.color) {
+                let known = tried.all().find(|tried| tried.pose() == other);
                 let color = match known {
                     Some(known) => known.color,
                     None => {
@@ -266,11 +294,6 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         });
         session.workspace.alternatives = list;
     }
-}
-
-/// Returns the correlation that colors may have by chance: it is large for few cells.
-fn by_chance(color: &ColorEvidence) -> f64 {
-    CHANCE / (color.cells.max(1) as f64).sqrt()
 }
 
 /// Adds a pose to a short list, best first. Of two that are not distinct, the better stays.
