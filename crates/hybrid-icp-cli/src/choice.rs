@@ -55,12 +55,21 @@ impl PipelineArguments {
             Some(Source::Preset(Preset::Color)) if !given => {
                 warn("there is no --rgb, so --pipeline color does what auto does");
             }
-            None if given && !self.overrides.is_empty() => {
-                warn(
-                    "--rgb is not used: with --set, the pipeline is auto, unless --pipeline color is given",
-                );
-            }
+            Some(Source::Preset(preset)) if given && preset != Preset::Color => warn(format!(
+                "--rgb is not used: the pipeline {} ignores colors, expected --pipeline color",
+                preset.name()
+            )),
+            _ if given => self.check_overrides("--rgb is"),
             _ => {}
+        }
+    }
+
+    /// Warns if overrides choose a pipeline that ignores the colors that a message names.
+    pub(crate) fn check_overrides(&self, colors: &str) {
+        if self.pipeline.is_none() && !self.overrides.is_empty() {
+            warn(format!(
+                "{colors} not used: with --set, the pipeline is auto, unless --pipeline color is given"
+            ));
         }
     }
 

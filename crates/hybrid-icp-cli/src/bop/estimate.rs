@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = arguments;
     let files = Files::default().reads("--detections", [path]);
     job.check_files(files, "", dataset)?;
-    let pipeline = job.choose_pipeline(dataset)?;
+    let pipeline = job.choose_pipeline(dataset, false)?;
     let detections = limits().read_detections(path)?.into_iter();
     let detected = detections.map(|detection| {
         let (scene, image, object) = (

@@ -76,8 +76,18 @@ impl JobOptions {
     }
 
     /// Chooses the pipeline; by default, `color` if color images are used.
-    pub(crate) fn choose_pipeline(&self, dataset: &DatasetOptions) -> anyhow::Result<Pipeline> {
+    ///
+    /// If it `refines`, warns of color images that overrides leave unused. An estimate compares
+    /// colors with every pipeline.
+    pub(crate) fn choose_pipeline(
+        &self,
+        dataset: &DatasetOptions,
+        refines: bool,
+    ) -> anyhow::Result<Pipeline> {
         let color = !self.models.no_color && dataset.has_color();
+        if color && refines {
+            self.pipeline.check_overrides("the color images are");
+        }
         self.pipeline.choose(color)
     }
 

@@ -75,7 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .reads("--results", [results])
         .reads("--detections", &arguments.masks.detections);
     arguments.job.check_files(files, "--results", dataset)?;
-    let pipeline = arguments.job.choose_pipeline(dataset)?;
+    let pipeline = arguments.job.choose_pipeline(dataset, true)?;
     let rows = arguments.read_rows()?;
     let masks = arguments.masks.source()?;
     let job = arguments.job.job(dataset, results, masks, pipeline);
