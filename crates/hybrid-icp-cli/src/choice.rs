@@ -73,6 +73,17 @@ impl PipelineArguments {
         }
     }
 
+    /// Warns of overrides that bound a search around an initial pose, for an estimate without one.
+    pub(crate) fn check_bounds(&self) {
+        for bound in ["max_rotation_degrees", "max_translation_meters"] {
+            if self.overrides.iter().any(|set| set.contains(bound)) {
+                warn(format!(
+                    "--set {bound} has no effect, because there is no initial pose"
+                ));
+            }
+        }
+    }
+
     /// Reads the file, applies the overrides, and checks that the pipeline builds.
     ///
     /// `color` states whether color images are used.

@@ -49,8 +49,9 @@ impl JobOptions {
         self.check_files(inputs)?;
         let color = inputs.files.rgb.is_some();
         // An estimate compares colors with every pipeline.
-        if inputs.init.is_some() {
-            self.pipeline.check_colors(color);
+        match inputs.init {
+            Some(_) => self.pipeline.check_colors(color),
+            None => self.pipeline.check_bounds(),
         }
         let pipeline = self.pipeline.choose(color)?;
         let trace_path = self.trace.as_ref();

@@ -78,14 +78,16 @@ impl JobOptions {
     /// Chooses the pipeline; by default, `color` if color images are used.
     ///
     /// If it `refines`, warns of color images that overrides leave unused. An estimate compares
-    /// colors with every pipeline.
+    /// colors with every pipeline, and has no use for bounds.
     pub(crate) fn choose_pipeline(
         &self,
         dataset: &DatasetOptions,
         refines: bool,
     ) -> anyhow::Result<Pipeline> {
         let color = !self.models.no_color && dataset.has_color();
-        if color && refines {
+        if !refines {
+            self.pipeline.check_bounds();
+        } else if color {
             self.pipeline.check_overrides("the color images are");
         }
         self.pipeline.choose(color)

@@ -51,6 +51,13 @@ fn an_object_is_found_in_its_mask_or_box() {
 }
 
 #[test]
+fn bounds_around_an_initial_pose_are_warned_of() {
+    let region = "--mask mask.png --set max_rotation_degrees=30";
+    let told = estimate(&Scene::new(), region).exits(0);
+    told.warns(&["max_rotation_degrees has no effect", "no initial pose"]);
+}
+
+#[test]
 fn an_estimate_that_finds_nothing_has_no_pose() {
     let scene = Scene::new();
     let told = estimate(&scene, "--bbox 0,0,20,20").exits(0);
