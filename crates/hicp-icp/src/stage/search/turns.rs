@@ -23,9 +23,10 @@ const NEAR: f64 = 0.05;
 /// Largest distance of a surface of revolution from itself after a rotation, as a share of the
 /// diameter.
 const SMOOTH: f64 = 0.015;
-/// Information, relative to the best known direction, up to which a rotation stays as it is: dents
-/// of a surface of revolution determine a rotation around its axis, but it may be seen at any.
-const DENTED: f64 = 0.02;
+/// Information about a direction, relative to the best known one, up to which a registration does
+/// not move along it. The dents of a can say something about the rotation around its axis, but too
+/// little for an image to show it.
+const LEAST_INFORMATION: f64 = 0.02;
 /// Rotation by which the registration of a surface of revolution may change a motion, radians.
 const SNAPPED: f64 = 0.15;
 /// Smallest rotation that determines an axis, radians.
@@ -88,7 +89,7 @@ impl Turns {
             filter: MaxDistance::diameters(NEAR),
             metric: Conditioned {
                 metric: PointToPlane,
-                threshold: DENTED,
+                threshold: LEAST_INFORMATION,
                 ..Conditioned::default()
             },
             stop: (Convergence::default(), IterationLimit(15)),
