@@ -24,7 +24,8 @@ use crate::stage::stage_trait::Stage;
 /// 3. If the colors agree only roughly, [`ColorAgreement`] is compared at the neighbors of the pose
 ///    of the stage and of the best other one, and the best neighbor is polished.
 /// 4. [`ColorAgreement`] decides. Another pose replaces that of the stage only if its score of the
-///    depth is nearly as good, and its colors agree clearly better than near the pose of the stage.
+///    depth is nearly as good, its colors agree clearly better, and no pose near that of the stage
+///    agrees as well.
 ///
 /// [`Alternative::color_gap`] then has the margin of each alternative that is nearly as good in
 /// depth.
@@ -198,7 +199,7 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
         if !tried.all().any(|tried| tried.color.is_telling()) {
             return outcome;
         }
-        let chosen = *tried.other().unwrap_or(tried.own());
+        let chosen = *tried.chosen();
         self.list(problem, &chosen, &tried, session);
         Outcome {
             iterations,

@@ -40,7 +40,7 @@ pub(crate) struct Tried<'a> {
 }
 
 impl Tried<'_> {
-    /// Iterates over all of them. That of the stage is the first.
+    /// Iterates over all poses, that of the stage first.
     pub(crate) fn all(&self) -> impl Iterator<Item = &Measured> {
         std::iter::once(&self.first).chain(&self.others)
     }
@@ -50,10 +50,15 @@ impl Tried<'_> {
         color.is_telling() && color.correlation >= self.least_correlation.max(by_chance(color))
     }
 
-    /// Returns whether the colors of one of the poses agree so well that no other is tried.
+    /// Returns whether the colors of the chosen pose agree so well that no other is tried.
     pub(crate) fn is_sure(&self) -> bool {
-        let sure = |color: &ColorEvidence| color.correlation > SURE && self.agrees(color);
-        self.all().any(|tried| sure(&tried.color))
+        let color = &self.chosen().color;
+        color.correlation > SURE && self.agrees(color)
+    }
+
+    /// Returns the pose that color chooses.
+    pub(crate) fn chosen(&self) -> &Measured {
+        self.other().unwrap_or(self.own())
     }
 
     /// Returns the pose of the stage, or one near it whose colors agree better.
