@@ -59,17 +59,17 @@ impl PipelineArguments {
                 "--rgb is not used: the pipeline {} ignores colors, expected --pipeline color",
                 preset.name()
             )),
-            _ if given => self.check_overrides("--rgb is"),
+            _ if given => self.check_overrides(),
             _ => {}
         }
     }
 
-    /// Warns if overrides choose a pipeline that ignores the colors that a message names.
-    pub(crate) fn check_overrides(&self, colors: &str) {
+    /// Warns if overrides choose a pipeline that ignores the colors that are given.
+    pub(crate) fn check_overrides(&self) {
         if self.pipeline.is_none() && !self.overrides.is_empty() {
-            warn(format!(
-                "{colors} not used: with --set, the pipeline is auto, unless --pipeline color is given"
-            ));
+            warn(
+                "colors are not used: with --set, the pipeline is auto, unless --pipeline color is given",
+            );
         }
     }
 

@@ -88,7 +88,7 @@ impl JobOptions {
         if !refines {
             self.pipeline.check_bounds();
         } else if color {
-            self.pipeline.check_overrides("the color images are");
+            self.pipeline.check_overrides();
         }
         self.pipeline.choose(color)
     }
