@@ -27,6 +27,7 @@ mod pipelines;
 mod pose_json;
 mod refine;
 mod terminal;
+mod track;
 
 use std::ffi::OsString;
 
@@ -57,6 +58,9 @@ Examples:
       --depth-scale 0.1 --mask mask.png --camera camera.json
   hybrid-icp doctor --model mug.ply --model-unit mm --depth depth.png \\
       --depth-scale 0.1 --mask mask.png --camera camera.json --init pose.json
+  hybrid-icp track --model mug.ply --model-unit mm --depth recording/depth \\
+      --depth-scale 0.1 --camera camera.json --init pose.json \\
+      --output tracked.jsonl
   hybrid-icp align a.ply b.pcd --output moved.json
   hybrid-icp bop refine --dataset bop/ycbv --results in.csv --output out.csv
   hybrid-icp bop eval --dataset bop/ycbv --results out.csv
@@ -80,6 +84,7 @@ enum Command {
     Estimate(refine::estimate::Arguments),
     Doctor(refine::doctor::Arguments),
     Replay(refine::replay::Arguments),
+    Track(track::Arguments),
     Align(align::Arguments),
     /// Work on datasets in the layout of the BOP benchmark.
     #[command(subcommand)]
@@ -158,6 +163,7 @@ where
         Command::Estimate(arguments) => refine::estimate::run(&arguments),
         Command::Doctor(arguments) => refine::doctor::run(&arguments),
         Command::Replay(arguments) => refine::replay::run(&arguments),
+        Command::Track(arguments) => track::run(&arguments),
         Command::Align(arguments) => align::run(&arguments),
         Command::Bop(command) => bop::run(&command),
         Command::Inspect(arguments) => inspect::run(&arguments),

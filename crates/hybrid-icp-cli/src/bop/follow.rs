@@ -16,7 +16,7 @@ use super::models;
 use super::options::DatasetOptions;
 use crate::limits::limits;
 use crate::outputs::Files;
-use crate::terminal::{say_beside, warn};
+use crate::terminal::say_beside;
 
 /// The options of a command that follows one object through a scene.
 #[derive(Debug, Args)]
@@ -110,15 +110,13 @@ impl FollowOptions {
         }
     }
 
-    /// Warns that all poses are guesses; `failed` says what happened in none of the images.
-    pub(super) fn distrust(&self, images: usize, failed: &str) {
-        warn(format_args!(
-            "{}: {failed} in none of its {images} images: do not trust its poses, and check {}, {}, \
-             --object and its mesh, and cam_K and depth_scale in scene_camera.json",
-            self.output.display(),
+    /// Returns what to check if all poses are guesses.
+    pub(super) fn advice(&self) -> String {
+        format!(
+            "{}, {}, --object and its mesh, and cam_K and depth_scale in scene_camera.json",
             self.init.display(),
             self.check_unit()
-        ));
+        )
     }
 
     /// Reads the pose in the first image from a pose file or a result file (`.csv`).

@@ -4,7 +4,7 @@ mod advice;
 mod compare;
 mod estimate;
 mod eval;
-mod faults;
+pub(crate) mod faults;
 mod follow;
 mod generate;
 mod models;
@@ -12,7 +12,7 @@ mod options;
 mod refine;
 mod sequence;
 mod show;
-mod statistics;
+pub(crate) mod statistics;
 mod targets;
 mod track;
 

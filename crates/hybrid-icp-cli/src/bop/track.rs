@@ -1,23 +1,16 @@
 //! `hybrid-icp bop track`.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::time::Instant;
-
-use anyhow::{Error, bail};
+use anyhow::Error;
 use clap::Args;
-use hicp_bop::{Fault, Scenes};
+use hicp_bop::Scenes;
 use hicp_io::bop::ResultRow;
-use hybrid_icp::core::{DepthImage, Isometry3, Model, PinholeCamera};
-use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
-use serde_json::{Value, json};
+use hybrid_icp::TrackState;
+use serde_json::json;
 
 use super::follow::FollowOptions;
-use super::statistics::{count, median};
-use super::{faults, models};
-use crate::options::positive;
-use crate::pose_json::add_pose;
-use crate::terminal::{counted, progress_bar, warn};
+use super::models;
+use crate::terminal::{counted, progress_bar};
+use crate::track::steps::{Line, Rate};
 
 /// Track a moving object through the images of a scene, without masks.
 ///
@@ -41,9 +34,8 @@ use crate::terminal::{counted, progress_bar, warn};
 pub(crate) struct Arguments {
     #[command(flatten)]
     follow: FollowOptions,
-    /// Number of images per second. Images whose ids are not successive are further apart.
-    #[arg(long, value_name = "N", default_value_t = 30.0, value_parser = positive, allow_negative_numbers = true)]
-    fps: f64,
+    #[command(flatten)]
+    rate: Rate,
 }
 
 const USAGE: &str = "\
@@ -55,16 +47,6 @@ Example:
   hybrid-icp bop generate --scenes 1 --images 20 --moving --out moving
   hybrid-icp bop track --dataset moving --scene 1 --object 1 \\
       --init moving/initial_synthetic-test.csv --output tracked.jsonl";
-
-/// The largest plausible rate of images. Higher ones are probably in other units.
-const MAX_FPS: f64 = 1000.0;
-
-/// The result of an image.
-struct Line {
-    im_id: u32,
-    tracked: Tracked,
-    seconds: f64,
-}
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -81,135 +63,42 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = &models.by_id[&object];
     let start = follow.initial_pose(images[0])?;
     let progress = progress_bar(images.len(), "images");
-    let (lines, faults) = arguments.track(&scenes, &images, model, &start)?;
+    let read = images.iter().map(|&id| {
+        progress.inc(1);
+        let image = scenes.read((scene_id, id));
+        (id, image.map(|image| (image.camera, image.depth)))
+    });
+    let tracked = arguments.rate.track(model, &start, read)?;
     progress.finish_and_clear();
-    let seen = lines.iter().filter(|l| l.tracked.state != TrackState::Lost);
+    let lines = images.iter().zip(&tracked.lines);
+    let place = |im_id| json!({"scene_id": scene_id, "im_id": im_id, "obj_id": object});
     follow.write(
-        lines.iter().map(|line| line.json(scene_id, object)),
-        seen.map(|line| line.row(scene_id, object)),
+        lines.clone().map(|(im_id, line)| line.json(place(im_id))),
+        lines
+            .filter(|(_, line)| line.tracked.state != TrackState::Lost)
+            .map(|(im_id, line)| row(line, (scene_id, *im_id, object))),
     )?;
-    let text = format!(
+    follow.say(format!(
         "{}: {} of scene {scene_id}, object {object}{}",
         follow.output.display(),
-        counted(lines.len(), "image"),
-        summarize(&lines),
-    );
-    follow.say(text)?;
-    let fps = arguments.fps;
-    if fps > MAX_FPS {
-        warn(format_args!(
-            "--fps is {fps}, expected the number of images per second, at most {MAX_FPS}: the \
-             motion of the object is not predicted"
-        ));
-    }
+        counted(images.len(), "image"),
+        tracked.summary(),
+    ))?;
+    arguments.rate.check();
     models::warn_of(
         &models,
         &dataset.models_dir()?,
         &dataset.models_info_path()?,
     );
-    let damaged = faults::report(faults.iter(), [].iter());
-    if faults.len() == lines.len() {
-        bail!(
-            "the depth of no image could be read: all poses in {} are guesses",
-            follow.output.display()
-        );
-    }
-    if !lines.iter().any(Line::is_tracking) {
-        follow.distrust(lines.len(), "the object is tracked");
-    }
-    if let Some(damaged) = damaged {
-        bail!(
-            "{damaged}; in their images, {} has a predicted pose",
-            follow.output.display()
-        );
-    }
-    Ok(())
+    tracked.report(&follow.output, &follow.advice())
 }
 
-impl Arguments {
-    /// Tracks the object through the images, in which unreadable ones show nothing.
-    fn track(
-        &self,
-        scenes: &Scenes,
-        images: &[u32],
-        model: &Model,
-        start: &Isometry3<f64>,
-    ) -> anyhow::Result<(Vec<Line>, Vec<Fault>)> {
-        // The camera of the first readable image replaces it.
-        let unknown = PinholeCamera::new(1.0, 1.0, 0.0, 0.0, 1, 1)?;
-        let mut tracker = Tracker::new(model.clone(), unknown, TrackerConfig::default());
-        tracker.start(start);
-        let (mut lines, mut faults) = (Vec::with_capacity(images.len()), Vec::new());
-        let mut nothing = Arc::new(DepthImage::from_meters(1, 1, vec![0.0])?);
-        let mut before = images[0];
-        for im_id in images {
-            let depth = match scenes.read((self.follow.scene, *im_id)) {
-                Ok(image) => {
-                    let camera = image.camera;
-                    tracker.set_camera(camera);
-                    let (width, height) = camera.size();
-                    if nothing.size() != camera.size() {
-                        let pixels = vec![0.0; camera.region().area()];
-                        nothing = Arc::new(DepthImage::from_meters(width, height, pixels)?);
-                    }
-                    image.depth
-                }
-                Err(fault) => {
-                    faults.push(fault);
-                    Arc::clone(&nothing)
-                }
-            };
-            let clock = Instant::now();
-            let passed = f64::from(im_id - std::mem::replace(&mut before, *im_id)) / self.fps;
-            let tracked = tracker.step(depth, passed, None)?;
-            lines.push(Line {
-                im_id: *im_id,
-                tracked,
-                seconds: clock.elapsed().as_secs_f64(),
-            });
-        }
-        Ok((lines, faults))
-    }
-}
-
-impl Line {
-    fn is_tracking(&self) -> bool {
-        self.tracked.state == TrackState::Tracking
-    }
-
-    /// Returns the row of a result file. Its score is the agreement, or 0 if the pose is doubtful.
-    fn row(&self, scene_id: u32, obj_id: u32) -> ResultRow {
-        let pose = self.tracked.camera_from_object;
-        let mut row = ResultRow::new(scene_id, self.im_id, obj_id, pose);
-        row.score = match self.is_tracking() {
-            true => self.tracked.agreement(),
-            false => 0.0,
-        };
-        row
-    }
-
-    /// Returns the line of JSON.
-    fn json(&self, scene_id: u32, obj_id: u32) -> Value {
-        let Tracked {
-            state, evidence, ..
-        } = self.tracked;
-        let shares: BTreeMap<_, _> = evidence.named().into_iter().collect();
-        let mut line = json!({
-            "scene_id": scene_id, "im_id": self.im_id, "obj_id": obj_id, "state": state.name(),
-            "score": self.tracked.agreement(), "time": self.seconds, "evidence": shares,
-            "deviation_mm": 1e3 * self.tracked.deviation_meters,
-        });
-        add_pose(&mut line, &self.tracked.camera_from_object);
-        line
-    }
-}
-
-/// Counts the images by state, and adds the median time.
-fn summarize(lines: &[Line]) -> String {
-    let mut text = count(lines.iter().map(|line| line.tracked.state.name()));
-    let mut times: Vec<f64> = lines.iter().map(|line| 1e3 * line.seconds).collect();
-    if let Some(median) = median(&mut times) {
-        text.push_str(&format!("\n  median time {median:.1} ms"));
-    }
-    text
+/// Returns the row of a result file. Its score is the agreement, or 0 if the pose is doubtful.
+fn row(line: &Line, (scene_id, im_id, obj_id): (u32, u32, u32)) -> ResultRow {
+    let mut row = ResultRow::new(scene_id, im_id, obj_id, line.tracked.camera_from_object);
+    row.score = match line.is_tracking() {
+        true => line.tracked.agreement(),
+        false => 0.0,
+    };
+    row
 }

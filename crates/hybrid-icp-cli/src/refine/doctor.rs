@@ -78,7 +78,7 @@ struct Named {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut inputs = arguments.inputs.clone();
-    let unit = inputs.files.unit()?;
+    let unit = inputs.files.object.unit()?;
     if inputs.region.mask.is_none() {
         let text = "--mask <FILE> is missing, expected the mask of the object alone: in a box, other objects hide the fault\n";
         return Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text).into());

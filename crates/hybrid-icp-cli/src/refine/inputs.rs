@@ -1,20 +1,17 @@
 //! The files that a refinement reads.
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use clap::error::ErrorKind;
 use clap::{ArgGroup, Args};
-use hicp_io::bop::ModelInfo;
-use hicp_io::{CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, register_depth};
-use hybrid_icp::checks::{box_overlaps, warning_of_box, warning_of_diameter};
-use hybrid_icp::core::{
-    ColorImage, DepthImage, Mask, Model, ModelConfig, Observation, PinholeCamera,
+use hicp_io::{
+    CameraFile, IoErrorKind, LengthUnit, MaskFile, MaskRule, PoseFile, RawDepth, register_depth,
 };
+use hybrid_icp::checks::{box_overlaps, warning_of_box};
+use hybrid_icp::core::{ColorImage, DepthImage, Mask, Model, Observation, PinholeCamera};
 use serde::{Deserialize, Serialize};
 
-use super::colors;
+use super::object::ObjectFiles;
 use crate::limits::limits;
 use crate::options::{finite, positive};
 
@@ -24,17 +21,8 @@ const FARTHEST_CAMERAS_METERS: f64 = 1.0;
 /// The files that describe the object and the image.
 #[derive(Clone, Debug, Args, Serialize, Deserialize)]
 pub(crate) struct ImageFiles {
-    /// The object's mesh: GLB, glTF, OBJ, OFF, PLY or STL.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) model: PathBuf,
-    /// Unit of the mesh's coordinates: m, mm or cm. Required unless the mesh is glTF, which is in
-    /// m.
-    #[arg(long, value_name = "UNIT")]
-    pub(crate) model_unit: Option<LengthUnit>,
-    /// The symmetries of the object: a models_info.json of BOP. If it describes several objects,
-    /// the name of the mesh states the id, as obj_000005.ply does.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) symmetries: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) object: ObjectFiles,
     /// The depth image: PNG, TIFF, NPY, NPZ, EXR, PGM or PFM. 16-bit integers with a depth scale,
     /// or floating-point meters; 0 or NaN where nothing was measured.
     #[arg(long, value_name = "FILE")]
@@ -68,48 +56,6 @@ pub(crate) struct ImageFiles {
     /// m for all other forms.
     #[arg(long, value_name = "UNIT", requires = "camera_from_depth")]
     pub(crate) camera_from_depth_unit: Option<LengthUnit>,
-}
-
-impl ImageFiles {
-    /// Returns the unit of the mesh.
-    ///
-    /// Fails with a `clap::Error` if it is neither stated nor part of the format.
-    pub(crate) fn unit(&self) -> anyhow::Result<LengthUnit> {
-        let is_gltf = ["glb", "gltf"].iter().any(|name| {
-            (self.model.extension()).is_some_and(|found| found.eq_ignore_ascii_case(name))
-        });
-        match self.model_unit {
-            Some(unit) => Ok(unit),
-            None if is_gltf => Ok(LengthUnit::Meters),
-            None => {
-                let text =
-                    "--model-unit <UNIT> is missing, expected the unit of the mesh: m, mm or cm\n";
-                Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text).into())
-            }
-        }
-    }
-
-    /// Reads the declared symmetries of the mesh, and the diameter beside them.
-    fn read_symmetries(&self) -> anyhow::Result<Option<ModelInfo>> {
-        let Some(path) = &self.symmetries else {
-            return Ok(None);
-        };
-        let mut objects = limits().read_models_info(path)?;
-        let name = self.model.file_stem().and_then(OsStr::to_str);
-        let id = name.and_then(|name| name.strip_prefix("obj_")?.parse().ok());
-        let (file, mesh, count) = (path.display(), self.model.display(), objects.len());
-        if let Some(id) = id {
-            let object = objects.remove(&id);
-            let absent = || format!("{file}: no object {id}, expected that of {mesh}");
-            return object.map(Some).with_context(absent);
-        }
-        match objects.pop_first() {
-            Some((_, object)) if objects.is_empty() => Ok(Some(object)),
-            _ => bail!(
-                "{file}: found {count} objects, expected one, or a mesh with an id in its name, such as obj_000005.ply, instead of {mesh}"
-            ),
-        }
-    }
 }
 
 /// The pixels of a mask that belong to the object.
@@ -191,7 +137,11 @@ fn bbox(text: &str) -> Result<Bbox, String> {
 }
 
 /// Reads a camera for the images of `size` in `image`.
-fn read_camera(path: &Path, size: (u32, u32), image: &Path) -> anyhow::Result<CameraFile> {
+pub(crate) fn read_camera(
+    path: &Path,
+    size: (u32, u32),
+    image: &Path,
+) -> anyhow::Result<CameraFile> {
     match limits().read_camera(path, size) {
         Err(error) if error.kind == IoErrorKind::CameraSize => bail!(
             "{}: found {}, but {} is {}x{}, expected the same size",
@@ -203,6 +153,52 @@ fn read_camera(path: &Path, size: (u32, u32), image: &Path) -> anyhow::Result<Ca
         ),
         read => Ok(read?),
     }
+}
+
+/// Converts a depth image to meters and removes the distortion of its lens.
+///
+/// Also returns the millimeters per unit: `scale`, or if not given, those of the camera file at
+/// `path`, or 1000 for floating point.
+pub(crate) fn to_meters(
+    depth: RawDepth,
+    scale: Option<f64>,
+    camera: &CameraFile,
+    path: &Path,
+) -> anyhow::Result<(DepthImage, f64)> {
+    let default = match depth.is_float() {
+        true => Some(1000.0),
+        false => camera.depth_scale,
+    };
+    let Some(scale) = scale.or(default) else {
+        bail!(
+            "{}: no depth_scale, expected this key or --depth-scale (millimeters per unit of the depth image)",
+            path.display()
+        )
+    };
+    let depth = depth.scaled(Some(scale))?;
+    let undistorted = camera.distortion.as_ref();
+    let undistorted = undistorted.map(|lens| lens.undistort_depth(&camera.camera, &depth));
+    Ok((undistorted.unwrap_or(depth), scale))
+}
+
+/// Reads the color image of a camera, and removes the distortion of its lens.
+fn read_color(path: &Path, camera: &CameraFile, camera_path: &Path) -> anyhow::Result<ColorImage> {
+    let color = limits().read_color(path)?;
+    let size = (camera.camera.width(), camera.camera.height());
+    let (width, height) = (color.width(), color.height());
+    if (width, height) != size {
+        bail!(
+            "{} is {width}x{height} pixels, but {} is for images of {}x{}, expected the same size: register the color image with the depth image, or state the camera of the color image with --camera and that of the depth image with --depth-camera and --camera-from-depth",
+            path.display(),
+            camera_path.display(),
+            size.0,
+            size.1,
+        );
+    }
+    Ok(match &camera.distortion {
+        Some(distortion) => distortion.undistort_color(&camera.camera, &color),
+        None => color,
+    })
 }
 
 /// The inputs of a refinement, or without an initial pose those of an estimate.
@@ -287,25 +283,9 @@ impl Inputs {
         };
         let of_mask = read_camera(&files.camera, size, sized)?;
         let of_depth = depth_camera.as_ref().unwrap_or(&of_mask);
-        let default = match depth.is_float() {
-            true => Some(1000.0),
-            false => of_depth.depth_scale,
-        };
-        let Some(depth_scale) = files.depth_scale.or(default) else {
-            bail!(
-                "{}: no depth_scale, expected this key or --depth-scale (millimeters per unit of the depth image)",
-                files
-                    .depth_camera
-                    .as_ref()
-                    .unwrap_or(&files.camera)
-                    .display()
-            )
-        };
         let camera = of_mask.camera;
-        let mut depth = depth.scaled(Some(depth_scale))?;
-        if let Some(distortion) = &of_depth.distortion {
-            depth = distortion.undistort_depth(&of_depth.camera, &depth);
-        }
+        let named = files.depth_camera.as_ref().unwrap_or(&files.camera);
+        let (mut depth, depth_scale) = to_meters(depth, files.depth_scale, of_depth, named)?;
         if let Some(path) = &files.camera_from_depth {
             let pose = limits.read_pose(path, files.camera_from_depth_unit)?;
             let pose = pose.camera_from_object;
@@ -324,20 +304,9 @@ impl Inputs {
             (None, _) => Mask::in_box(depth.width(), depth.height(), bbox),
         };
         let rgb = files.rgb.as_deref();
-        let info = files.read_symmetries()?;
-        let stated = ModelConfig {
-            diameter: info.as_ref().map(|info| info.diameter_m),
-            ..ModelConfig::default()
-        };
-        let symmetries = info.map(|info| info.symmetries).unwrap_or_default();
-        let (model, warning) = colors::read_model(&files.model, files.unit()?, symmetries, rgb)?;
-        warnings.extend(warning);
-        if let Some(path) = &files.symmetries {
-            let warning = warning_of_diameter(&Model::with_config(model.mesh().clone(), stated));
-            let text = |warning| format!("{}: {warning}: check both units", path.display());
-            warnings.extend(warning.map(text));
-        }
-        let color = rgb.map(|path| colors::read_image(path, &of_mask, &files.camera));
+        let (model, of_object) = files.object.read(rgb)?;
+        warnings.extend(of_object);
+        let color = rgb.map(|path| read_color(path, &of_mask, &files.camera));
         let init = self.init.as_ref();
         let init = init.map(|path| limits.read_pose(path, self.init_unit));
         Ok(Read {
@@ -381,8 +350,8 @@ impl Inputs {
     pub(crate) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
         let files = &self.files;
         let given = [
-            ("--model", Some(&files.model)),
-            ("--symmetries", files.symmetries.as_ref()),
+            ("--model", Some(&files.object.mesh)),
+            ("--symmetries", files.object.symmetries.as_ref()),
             ("--depth", Some(&files.depth)),
             ("--mask", self.region.mask.as_ref()),
             ("--rgb", files.rgb.as_ref()),

@@ -41,7 +41,7 @@ pub(crate) struct JobOptions {
 impl JobOptions {
     /// Refines the initial pose of the inputs, or estimates a pose if there is none.
     pub(super) fn run(&self, inputs: &Inputs) -> anyhow::Result<()> {
-        inputs.files.unit()?;
+        inputs.files.object.unit()?;
         let outputs = [&self.output, &self.alternatives, &self.overlay, &self.trace];
         if outputs.iter().all(|path| path.is_none()) {
             check_stdout()?;

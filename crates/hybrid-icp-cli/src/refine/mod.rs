@@ -1,10 +1,10 @@
 //! `hybrid-icp refine`, and the parts that it shares with `hybrid-icp estimate`.
 
-mod colors;
 pub(crate) mod doctor;
 pub(crate) mod estimate;
-mod inputs;
+pub(crate) mod inputs;
 mod job;
+pub(crate) mod object;
 pub(crate) mod replay;
 pub(crate) mod report;
 mod trace;

@@ -70,7 +70,8 @@ pub(super) fn about_inputs(
         inputs.init.is_some() || !matches!(warning, Warning::BehindCamera { .. })
     });
     let files = &inputs.files;
-    let (unit, model, depth) = (files.unit()?, files.model.display(), files.depth.display());
+    let (unit, depth) = (files.object.unit()?, files.depth.display());
+    let model = files.object.mesh.display();
     let mask = inputs.mask_name();
     let (init, pose_unit, size_unit) = match &inputs.init {
         Some(path) => (
@@ -110,7 +111,7 @@ pub(super) fn about_facts(
     observation: &Observation,
     inputs: &Inputs,
 ) -> Vec<String> {
-    let (model, mask) = (inputs.files.model.display(), inputs.mask_name());
+    let (model, mask) = (inputs.files.object.mesh.display(), inputs.mask_name());
     let facts = Diagnosis::facts(object, observation).into_iter();
     let in_words = |fault: Fault| match fault {
         Fault::MaskEmpty => Some(format!("{mask}: {fault}: {}", fault.fix())),

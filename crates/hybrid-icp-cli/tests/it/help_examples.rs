@@ -63,6 +63,8 @@ fn the_examples_of_all_help_texts_run() {
         hicp_io::write_ply(scene.path("mug.ply"), &car(), LengthUnit::Millimeters).unwrap();
         std::fs::copy(scene.path("init.json"), scene.path("pose.json")).unwrap();
         hicp_io::write_rgb_png(scene.path("rgb.png"), 320, 240, &[90; 3 * 320 * 240]).unwrap();
+        scene.create_dir("recording/depth");
+        std::fs::copy(scene.path("depth.png"), scene.path("recording/depth/1.png")).unwrap();
         write_clouds(&scene, &truth());
         for name in ["bop", "detections.json"] {
             symlink(shared.path(name), scene.path(name)).unwrap();
@@ -74,5 +76,5 @@ fn the_examples_of_all_help_texts_run() {
         let script = examples.replace("--poses 30", "--poses 1");
         run_script(scene.root(), &script, &command);
     }
-    assert!(n_examples >= 9, "{n_examples}");
+    assert!(n_examples >= 10, "{n_examples}");
 }

@@ -22,4 +22,5 @@ mod inspect;
 mod objects;
 mod pipelines;
 mod refine;
+mod track;
 mod ycbv;

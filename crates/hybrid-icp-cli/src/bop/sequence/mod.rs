@@ -26,6 +26,7 @@ use super::{faults, models};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
 use crate::terminal::{counted, progress_bar, warn};
+use crate::track::steps::distrust;
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
 ///
@@ -178,7 +179,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             }
         ));
     } else if tracker.check.accepted() == 0 {
-        follow.distrust(lines.len(), "an estimate is accepted");
+        let (accepted, advice) = ("an estimate is accepted", follow.advice());
+        distrust(&follow.output, accepted, lines.len(), &advice);
     }
     if let Some(damaged) = faults::report(tracker.faults.iter(), [].iter()) {
         bail!("{damaged}; {output} has no estimate for their images");

@@ -171,7 +171,7 @@ fn a_trace_is_replayed_to_the_last_digit() {
     for (content, expected) in [
         (
             &*in_inches,
-            "trace.jsonl:1: \"inputs.files.model_unit\": unknown variant `inch`, expected one of `m`, `mm`, `cm`",
+            "trace.jsonl:1: \"inputs.files.object.model_unit\": unknown variant `inch`, expected one of `m`, `mm`, `cm`",
         ),
         ("", "empty, expected a trace"),
         ("{", "trace.jsonl:1: expected a line of a trace"),
