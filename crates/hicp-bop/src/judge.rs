@@ -14,7 +14,7 @@ use crate::fault::{Fault, chain};
 use crate::frames::{FrameKey, frames_of};
 use crate::mask_source::no_ground_truth;
 use crate::models::Models;
-use crate::scenes::{Image, Scenes};
+use crate::scenes::{Image, Scenes, states_visibility};
 
 /// A model with the data for its errors.
 #[derive(Debug)]
@@ -141,6 +141,15 @@ impl<'a> Judge<'a> {
             }
         };
         judged.misfits = wrong_sizes(&image);
+        let chooses = |(obj_id, count): (&u32, &u32)| {
+            instances(&image, *obj_id, usize::MAX).len() > *count as usize
+        };
+        if !states_visibility(&image.scene, image.im_id) && wanted.iter().any(chooses) {
+            judged.misfits.push(format!(
+                "{}: no visib_fract of some instances, which count as fully visible: if a target has fewer instances than the image, the evaluated ones may be others than those of the benchmark",
+                image.scene.file("scene_gt_info").display(),
+            ));
+        }
         for (obj_id, count) in wanted {
             let count = *count as usize;
             if !self.objects.contains_key(obj_id) {

@@ -62,5 +62,5 @@ pub use mask_source::MaskSource;
 pub use models::{ModelFolder, Models};
 pub use result::{FrameResult, Rescore, RowResult};
 pub use row_status::RowStatus;
-pub use scenes::{Image, MIN_VISIBLE_FRACTION, Scenes, visible_objects};
+pub use scenes::{Image, MIN_VISIBLE_FRACTION, Scenes, states_visibility, visible_objects};
 pub use shard::{Part, Shard};

@@ -1,5 +1,7 @@
 //! The results of refining an image, and their transfer to the rows of the file.
 
+use std::collections::BTreeMap;
+
 use hicp_io::bop::ResultRow;
 use hybrid_icp::Warning;
 use hybrid_icp::checks::{warning_of_runner_up, warnings_of_result};
@@ -127,20 +129,29 @@ impl FrameResult {
     /// Returns rows with the alternatives of each row, best first.
     ///
     /// `rows` are those of [`Self::enter`]. At most `count` rows are returned for each. Their score
-    /// is that of the row minus their gap, and never above it.
+    /// is the lowest of the refined rows of the object, minus their gap. An evaluation that asks
+    /// for as many poses as there are instances then takes the best pose of each instance first.
     pub fn alternatives(
         &self,
         rows: &[ResultRow],
         count: usize,
     ) -> impl Iterator<Item = ResultRow> {
+        let mut lowest: BTreeMap<u32, f64> = BTreeMap::new();
+        for refined in self.rows.iter().filter(|refined| refined.pose.is_some()) {
+            if let Some(row) = rows.get(refined.index) {
+                let score = lowest.entry(row.obj_id).or_insert(row.score);
+                *score = score.min(row.score);
+            }
+        }
         self.rows.iter().flat_map(move |refined| {
             let row = rows.get(refined.index);
+            let lowest = row.and_then(|row| lowest.get(&row.obj_id).copied());
             let others = refined.alternatives.iter().take(count);
             row.into_iter().flat_map(move |row| {
-                others.clone().map(|other| {
+                others.clone().map(move |other| {
                     let mut row = row.clone();
                     row.set_camera_from_object(other.camera_from_object);
-                    row.score -= other.gap.max(0.0);
+                    row.score = lowest.unwrap_or(row.score) - other.gap.max(0.0);
                     row
                 })
             })

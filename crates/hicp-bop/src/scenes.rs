@@ -52,9 +52,11 @@ impl Image {
         match self.color.take_if(other) {
             None => Ok(()),
             Some(color) => Err(Fault::damaged(format!(
-                "{}, rgb of image {}: {}x{} pixels, expected {}x{} as the depth image",
-                self.scene.dir().display(),
-                self.im_id,
+                "{}: {}x{} pixels, expected {}x{} as the depth image",
+                self.scene
+                    .color_path(self.im_id)
+                    .unwrap_or_default()
+                    .display(),
                 color.width(),
                 color.height(),
                 expected.0,
@@ -161,6 +163,14 @@ impl Scenes {
 
 /// Smallest visible fraction of an instance that the BOP benchmark requests.
 pub const MIN_VISIBLE_FRACTION: f64 = 0.1;
+
+/// Returns whether the file of visibilities states that of every instance in an image.
+#[must_use]
+pub fn states_visibility(scene: &Scene, im_id: u32) -> bool {
+    let infos = scene.ground_truth_info(im_id).unwrap_or_default();
+    let stated = infos.iter().filter(|info| info.visible_fraction.is_some());
+    stated.count() >= scene.ground_truth(im_id).map_or(0, <[_]>::len)
+}
 
 /// Returns the ids of the objects in an image that are visible enough to be targets, one per
 /// instance.

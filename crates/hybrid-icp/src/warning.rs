@@ -50,9 +50,10 @@ pub enum Warning {
         /// The fault.
         fault: CenterFault,
     },
-    /// A box ends outside of the image ([`warning_of_box`](crate::checks::warning_of_box)).
+    /// A box ends outside of the image or within its first pixel
+    /// ([`warning_of_box`](crate::checks::warning_of_box)).
     #[error(
-        "the box ends at ({right}, {bottom}), outside of the {width}x{height} image: check that it is x, y, width, height, and not two corners"
+        "the box ends at ({right}, {bottom}) of the {width}x{height} image: check that it is x, y, width, height in pixels, and not two corners or shares of the image"
     )]
     Box {
         /// Column at which the box ends, pixels.

@@ -39,7 +39,14 @@ impl ReadLimits {
     ///
     /// As for [`read_targets`].
     pub fn read_targets(&self, path: impl AsRef<Path>) -> Result<Vec<Target>, IoError> {
-        json::read(self, path.as_ref(), Limit::JSON_BYTES)
+        json::read(self, path.as_ref(), Limit::JSON_BYTES).map_err(|mut error: IoError| {
+            if error.found == "no key `obj_id`" {
+                error.expected = "targets with objects, as in test_targets_bop19.json; those of \
+                                  BOP's later detection tasks have none"
+                    .to_owned();
+            }
+            error
+        })
     }
 }
 
@@ -67,7 +74,7 @@ mod tests {
         std::fs::write(&path, r#"[{"im_id": 3, "scene_id": 48}]"#).unwrap();
         assert!(matches!(
             read_targets(&path),
-            Err(IoError { expected, place: Some(Place::Field(key)), .. }) if key == "$[0]" && expected.contains("obj_id")
+            Err(IoError { expected, place: Some(Place::Field(key)), .. }) if key == "$[0]" && expected.contains("test_targets_bop19.json")
         ));
     }
 }

@@ -66,6 +66,15 @@ pub(crate) struct CameraRecord {
     pub(crate) rotation: Option<Rotation>,
     #[serde(rename = "cam_t_w2c")]
     pub(crate) translation_mm: Option<Numbers<3>>,
+    #[serde(
+        default,
+        alias = "dist",
+        alias = "D",
+        alias = "coeffs",
+        alias = "dist_coeffs",
+        alias = "distortion_coefficients"
+    )]
+    distortion: Option<Value>,
 }
 
 /// A calibration matrix in pixels, the width and height of the images, and the key of the matrix.
@@ -74,10 +83,23 @@ pub(crate) struct CameraRecord {
 type Calibration = (Matrix3<f64>, Option<(u32, u32)>, &'static str);
 
 impl CameraRecord {
+    /// Returns whether a coefficient of a distortion is not 0.
+    fn is_distorted(&self) -> bool {
+        let listed = self.distortion.as_ref().and_then(Value::as_array);
+        let mut coefficients = listed.into_iter().flatten();
+        coefficients.any(|coefficient| coefficient.as_f64() != Some(0.0))
+    }
+
     /// Returns the calibration. The error consists of the found and the expected text.
     pub(crate) fn calibration(&self) -> Result<Calibration, (&'static str, &'static str)> {
         let size = self.width.zip(self.height);
         let flat = [self.fx, self.fy, self.cx, self.cy];
+        if self.is_distorted() {
+            return Err((
+                "the distortion of a lens",
+                "images without distortion: undistort depth images and masks first",
+            ));
+        }
         match (&self.cam_k, &self.cam_model, flat, size) {
             (Some(_), Some(_), ..) => Err(("`cam_K` and `cam_model`", "one of them")),
             (Some(Numbers(k)), None, ..) => Ok((Matrix3::from_row_slice(k), size, ".cam_K")),
@@ -222,6 +244,7 @@ mod tests {
             (format!(r#"{{"7": {{{K}, "depth_scale": 1}}}}"#), Some(1.0)),
             (format!(r#"{{"7": {FLAT}}}"#), None),
             (FLAT.to_owned(), None),
+            (format!(r#"{{{K}, "dist": [0, 0.0, 0, 0]}}"#), None),
         ] {
             assert_eq!(
                 read(&text).unwrap(),
@@ -231,6 +254,14 @@ mod tests {
                     distortion: None
                 }
             );
+        }
+    }
+
+    #[test]
+    fn a_distortion_is_refused() {
+        for key in ["distortion", "dist_coeffs"] {
+            let error = read(&format!(r#"{{"7": {{{K}, "{key}": [0, 0.1, 0, 0]}}}}"#)).unwrap_err();
+            assert_eq!(error.found, "the distortion of a lens", "{error}");
         }
     }
 

@@ -149,7 +149,10 @@ impl ReadLimits {
                 if let Ok((head, _)) = read_head(path) {
                     check_format(path, &extension, &head)?;
                 }
-                let found = format!("a file with the extension {extension:?}");
+                let found = match path.is_dir() {
+                    true => "a folder".to_owned(),
+                    false => format!("a file with the extension {extension:?}"),
+                };
                 return Err(IoError::new(path, None, found, EXTENSIONS));
             }
         };

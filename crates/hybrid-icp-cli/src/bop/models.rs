@@ -44,15 +44,17 @@ impl ModelOptions {
     }
 }
 
-/// Returns the reasons why the colors of the meshes in `--models` cannot be used.
+/// Returns the reasons why the colors of the meshes cannot be used.
 ///
-/// Reads the meshes without color again.
+/// Without `--models`, they matter only if the dataset `has_color` images. Reads the meshes without
+/// color again.
 pub(crate) fn color_faults(
     options: &ModelOptions,
     models: &Models,
     folder: &ModelFolder,
+    has_color: bool,
 ) -> Vec<String> {
-    if options.folder.is_none() || options.no_color {
+    if options.no_color || (options.folder.is_none() && !has_color) {
         return Vec::new();
     }
     let fault = |(obj_id, model): (&u32, &Model)| {

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::bail;
-use hicp_bop::{MIN_VISIBLE_FRACTION, Targets, visible_objects};
-use hicp_io::IoError;
+use hicp_bop::{MIN_VISIBLE_FRACTION, Targets, chain, states_visibility, visible_objects};
+use hicp_io::IoErrorKind;
 use hicp_io::bop::Dataset;
 
 use crate::limits::limits;
@@ -34,7 +34,7 @@ pub(crate) fn choose(
             warn(format_args!(
                 "{why}: every instance of the split with a visible fraction of {MIN_VISIBLE_FRACTION} or more is a target",
             ));
-            return Ok(of_ground_truth(dataset, split)?);
+            return of_ground_truth(dataset, split);
         }
     };
     read(path)
@@ -59,16 +59,39 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Targets> {
     Ok(targets)
 }
 
-fn of_ground_truth(dataset: &Dataset, split: &str) -> Result<Targets, IoError> {
-    let mut targets = Targets::new();
+/// Returns the visible instances of all scenes. Warns of scenes without cameras.
+fn of_ground_truth(dataset: &Dataset, split: &str) -> anyhow::Result<Targets> {
+    let (mut targets, mut unstated) = (Targets::new(), None);
     for scene_id in dataset.scene_ids(split)? {
-        let scene = dataset.scene(split, scene_id)?;
+        let scene = match dataset.scene(split, scene_id) {
+            Ok(scene) => scene,
+            Err(error) if error.kind == IoErrorKind::Missing => {
+                warn(format_args!("{}; the scene is left out", chain(&error)));
+                continue;
+            }
+            Err(error) => return Err(error.into()),
+        };
         for im_id in scene.image_ids() {
+            if unstated.is_none() && !states_visibility(&scene, im_id) {
+                unstated = Some(scene.file("scene_gt_info"));
+            }
             for obj_id in visible_objects(&scene, im_id) {
                 let of_image = targets.entry((scene_id, im_id)).or_default();
                 *of_image.entry(obj_id).or_default() += 1;
             }
         }
+    }
+    if let Some(path) = unstated {
+        warn(format_args!(
+            "{}: no visib_fract of some instances, which count as fully visible",
+            path.display()
+        ));
+    }
+    if targets.is_empty() {
+        bail!(
+            "{}: no scene has a visible instance in scene_gt.json, expected ground truth to evaluate against",
+            dataset.root().join(split).display()
+        );
     }
     Ok(targets)
 }

@@ -117,7 +117,7 @@ fn files_that_cannot_be_read_are_errors_and_limits_can_be_raised() {
     folder
         .command("inspect no.stl")
         .fails(&["cannot read no.stl"]);
-    folder.command("inspect .").fails(&["extension"]);
+    folder.command("inspect .").fails(&["found a folder"]);
     folder.command("inspect cube.obj --unit inch").exits(2);
     let scene = Scene::new().with("--max-small-json-bytes", "9");
     scene

@@ -113,8 +113,9 @@ impl EvalJob {
         warnings.extend(self.misfits(&rows, &wanted));
         let missing = models::missing(&models, &models_dir);
         warnings.extend(missing.map(|text| format!("{text}; its targets are left out")));
-        let mut misfits: Vec<String> = Vec::new();
-        misfits.extend(judged.iter().flat_map(|image| image.misfits.clone()));
+        let misfits = judged.iter().flat_map(|image| image.misfits.clone());
+        let misfits: BTreeSet<String> = misfits.collect();
+        let mut misfits: Vec<String> = misfits.into_iter().collect();
         let more = misfits.len().saturating_sub(MISFITS_SHOWN);
         misfits.truncate(MISFITS_SHOWN);
         warnings.append(&mut misfits);

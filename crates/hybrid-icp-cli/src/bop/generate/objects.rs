@@ -1,6 +1,6 @@
 //! The objects of generated scenes.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
@@ -32,13 +32,18 @@ impl Objects {
 
     /// Reads the models of a folder.
     ///
-    /// If it has a models_info.json, the models keep their BOP ids. Otherwise, the meshes are
-    /// sorted by name and numbered from 1.
+    /// If it has a models_info.json, or all meshes have names such as obj_000005.ply, the models
+    /// keep their BOP ids. Otherwise, the meshes are sorted by name and numbered from 1.
     pub(super) fn read(dir: &Path, unit: LengthUnit) -> anyhow::Result<Self> {
         let info = dir.join("models_info.json");
         let (ids, models): (Vec<u32>, Vec<Model>) = if hicp_io::is_absent(&info) {
+            let paths = meshes(dir)?;
+            let named = paths.iter().map(|path| Some((id_of(path)?, path)));
+            let named: Option<BTreeMap<u32, &PathBuf>> = named.collect();
+            let named = named.filter(|named| named.len() == paths.len());
+            let numbered = named.unwrap_or_else(|| (1..).zip(&paths).collect());
             let read = |(id, path)| Ok((id, Model::new(read_mesh(path, unit)?)));
-            let models = (1..).zip(meshes(dir)?).map(read);
+            let models = numbered.into_iter().map(read);
             models.collect::<Result<_, IoError>>()?
         } else {
             let ids: BTreeSet<u32> = limits().read_models_info(&info)?.into_keys().collect();
@@ -67,6 +72,15 @@ impl Objects {
         }
         Ok(Self { ids, models })
     }
+}
+
+/// Returns the BOP id in the name of a mesh, as in obj_000005.ply.
+fn id_of(path: &Path) -> Option<u32> {
+    path.file_stem()?
+        .to_str()?
+        .strip_prefix("obj_")?
+        .parse()
+        .ok()
 }
 
 /// Returns the mesh files of a folder, sorted by name.

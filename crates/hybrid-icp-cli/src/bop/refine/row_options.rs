@@ -15,7 +15,7 @@ use crate::terminal::warn;
 pub(crate) struct RowOptions {
     /// Process and write only part I of N, counted from 1. Images are never split. If the rows of
     /// each image are contiguous, the concatenated outputs of all parts, with one header line,
-    /// equal the output of one run.
+    /// equal the output of one run (without --hypotheses, whose rows end each output).
     #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
     shard: Option<Shard>,
     /// Read only the first N rows or detections of the input. --top-k and --targets choose among

@@ -6,6 +6,8 @@ use hicp_bop::{FrameResult, RowResult};
 use hicp_io::IoError;
 use hicp_io::bop::ResultRow;
 
+use super::summary::status_text;
+
 const HEADER: &str = "scene_id,im_id,obj_id,row,status,mve_initial,mve,confidence,warnings";
 
 /// Writes one line per row of the output, in the order of the output.
@@ -34,7 +36,7 @@ pub(super) fn write(
             let written = is_written.then(|| place.next()).flatten();
             lines.serialize((
                 (row.scene_id, row.im_id, row.obj_id, written),
-                result.status.to_string(),
+                status_text(result.status, estimated),
                 [before, after, result.confidence].map(|number| number.map(|n| n.to_string())),
                 warnings.join("; "),
             ))?;

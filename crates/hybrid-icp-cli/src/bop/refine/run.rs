@@ -33,7 +33,8 @@ impl RefineJob<'_> {
         let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
         let models = pool.install(|| models::read_from(&folder, &objects));
         pool.install(|| models::warn_of(&models, folder.dir(), folder.info_path()));
-        let uncolored = models::color_faults(&self.models, &models, &folder);
+        let has_color = self.dataset.has_color();
+        let uncolored = models::color_faults(&self.models, &models, &folder, has_color);
         uncolored.iter().for_each(warn);
         let shared = DatasetRefiner {
             models,
@@ -68,9 +69,14 @@ impl RefineJob<'_> {
             result.enter(&mut rows, self.rescore, self.timed);
         }
         let preset: Result<Preset, _> = self.pipeline.name.parse();
-        let compares = self.estimates() || preset.map_or(true, |preset| preset == Preset::Color);
+        // Only who names `color` gets it without color images.
+        let compares = match preset {
+            Ok(Preset::Color) => true,
+            Ok(_) => self.estimates() && has_color,
+            Err(_) => has_color,
+        };
         let count = results.iter().filter(|result| result.uncolored).count();
-        if count > 0 && compares && self.dataset.has_color() {
+        if count > 0 && compares {
             let of = counted(results.len(), "frame");
             warn(format_args!(
                 "without an image in rgb/, the rows of {count} of {of} are refined by depth alone"

@@ -12,10 +12,20 @@ use hybrid_icp::switch::PAPER_ALPHA;
 use super::job::RefineJob;
 use crate::bop::statistics::median;
 use crate::bop::{faults, models};
-use crate::terminal::warn;
+use crate::terminal::{counted, warn};
 
 fn rows_of(results: &[FrameResult]) -> impl Iterator<Item = &RowResult> {
     results.iter().flat_map(|result| &result.rows)
+}
+
+/// Returns the words for the status of a row, or of a detection whose pose is estimated.
+pub(super) fn status_text(status: RowStatus, estimated: bool) -> String {
+    match (estimated, status) {
+        (true, RowStatus::Refined) => "estimated".to_owned(),
+        (true, RowStatus::NothingMeasured) => "left out: nothing measured inside".to_owned(),
+        (true, _) => status.to_string().replacen("kept", "left out", 1),
+        _ => status.to_string(),
+    }
 }
 
 /// Counts the rows by status, one line each.
@@ -31,12 +41,7 @@ pub(super) fn summary(
         *counts.entry(row.status).or_default() += 1;
     }
     for (status, count) in &counts {
-        let status_text = match (job.estimates(), status) {
-            (true, RowStatus::Refined) => "estimated".to_owned(),
-            (true, RowStatus::NothingMeasured) => "left out: nothing measured inside".to_owned(),
-            (true, _) => status.to_string().replacen("kept", "left out", 1),
-            _ => status.to_string(),
-        };
+        let status_text = status_text(*status, job.estimates());
         text.push_str(&format!("\n  {count:>7}  {status_text}"));
         if *status == RowStatus::MissingModel {
             text.push_str(&format!(" (object {})", models::ids(&models.missing)));
@@ -153,18 +158,24 @@ pub(super) fn report_faults(
     if let Some(damaged) = damaged {
         let of_damaged = rows_of(results).filter(|row| row.status == RowStatus::Damaged);
         bail!(
-            "{damaged}; {} rows are {unused} in {}",
-            of_damaged.count(),
+            "{damaged}; {} {unused} in {}",
+            counted(of_damaged.count(), "row"),
             job.output.display()
         );
     }
     let is_missing = |row: &RowResult| row.status == RowStatus::MissingFrame;
     if !results.is_empty() && rows_of(results).all(is_missing) {
         bail!(
-            "{}: none of its frames is in {}, expected --dataset and --split to name the images of the rows",
+            "{}: the images of none of its rows can be read in {}, expected --dataset, --split and --sensor to name their cameras and depth images",
             job.results.display(),
             job.dataset.root.join(&job.dataset.split).display()
         );
+    }
+    if job.estimates() && rows_of(results).all(|row| row.pose.is_none()) {
+        warn(format_args!(
+            "{}: no pose is estimated: check that bbox is x, y, width, height in pixels of the depth image, and segmentation of its size",
+            job.results.display()
+        ));
     }
     let is_undetected = |row: &RowResult| row.status == RowStatus::NoMask;
     if matches!(job.masks, MaskSource::Detections(_))

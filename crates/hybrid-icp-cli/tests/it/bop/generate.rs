@@ -246,6 +246,14 @@ fn the_same_options_give_the_same_bytes_on_any_number_of_threads() {
     folder.command("objects --out meshes").exits(0);
     generate(&folder, "--out e --objects meshes");
     assert_eq!(read("e").len(), 20);
+    // Ids in the names of all meshes are kept.
+    for (name, id) in [("mug", 30), ("pan", 5)] {
+        let mesh = folder.bytes(format!("meshes/{name}.ply"));
+        folder.create_dir("named");
+        folder.write(format!("named/obj_{id:06}.ply"), mesh);
+    }
+    generate(&folder, "--out f --objects named");
+    assert!(read("f").keys().eq(&[5, 30]));
 }
 
 #[test]

@@ -75,9 +75,9 @@ fn objects_that_models_info_does_not_describe_are_named_once() {
             "warning: ./models/models_info.json {fault}: no symmetries are declared, and diameters are those of the meshes\n"
         );
         assert_eq!(refine, wanted);
-        // The first warning of the evaluation is about the absent targets.
+        // The first warnings of the evaluation are about absent targets and visibilities.
         assert!(
-            eval.ends_with(&wanted) && eval.lines().count() == 2,
+            eval.ends_with(&wanted) && eval.lines().count() == 3,
             "{eval}"
         );
     }

@@ -139,7 +139,7 @@ fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
     let parts = ["rgb/000040.png", "PNG, JPEG or TIFF", "by depth alone"];
     damaged
         .fails(&parts)
-        .complains(&["1 file could not be used; 0 rows are unchanged"]);
+        .complains(&["1 file could not be used; 0 rows unchanged"]);
     let (_, refined) = world.refine(&rows, "--models models_color --no-color");
     for (color, depth) in refined.iter().zip(&depth_only) {
         let (a, b) = (color.camera_from_object(), depth.camera_from_object());
@@ -149,9 +149,17 @@ fn bop_refine_finds_the_color_images_and_takes_meshes_from_another_folder() {
     world.replace(path, "250 0 0", "250 none 0");
     let (warned, _) = world.refine(&rows, "--models models_color --no-color");
     assert!(!warned.exits(0).err.contains("a color"));
+    std::fs::rename(world.path("models"), world.path("models_gray")).unwrap();
+    std::fs::rename(world.path("models_color"), world.path("models")).unwrap();
+    let (warned, _) = world.refine(&rows, "");
+    warned.complains(&["obj_000001.ply", "a color that is not a number"]);
+    std::fs::rename(world.path("models"), world.path("models_color")).unwrap();
+    std::fs::rename(world.path("models_gray"), world.path("models")).unwrap();
     std::fs::remove_dir_all(&rgb).unwrap();
     let (warned, _) = world.refine(&rows, "--models models_color");
     warned.warns(&["obj_000001.ply", "a color that is not a number"]);
+    let (warned, _) = world.refine(&rows, "--models models_color --pipeline color");
+    warned.warns(&["without an image in rgb/"]);
     world
         .run("--models nothing")
         .fails(&["folder of models", "nothing"]);

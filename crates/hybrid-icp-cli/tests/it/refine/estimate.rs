@@ -191,8 +191,12 @@ fn every_detection_becomes_a_row_with_its_score_and_its_time() {
     ]);
     let status = world.read("rows.csv");
     let status: Vec<&str> = status.lines().collect();
-    assert_eq!(status[1], "3,0,9,,kept: missing model,,,,");
-    assert!(status[4].starts_with("3,40,2,0,refined,"), "{}", status[4]);
+    assert_eq!(status[1], "3,0,9,,left out: missing model,,,,");
+    assert!(
+        status[4].starts_with("3,40,2,0,estimated,"),
+        "{}",
+        status[4]
+    );
 }
 
 #[test]
@@ -208,5 +212,9 @@ fn boxes_of_two_corners_are_warned_of() {
         "1 of 1 images of scene 3",
         "check bbox in --detections",
     ];
+    bop_estimate(&world, "--pipeline hybrid").0.warns(&parts);
+    found[0]["bbox"] = json!([300, 220, -200, -140]);
+    world.write("found.json", json!(found).to_string());
+    let parts = ["found.json: no pose is estimated: check that bbox is"];
     bop_estimate(&world, "--pipeline hybrid").0.warns(&parts);
 }

@@ -110,6 +110,10 @@ fn without_targets_every_visible_instance_is_a_target() {
     eval(&world, "").exits(0);
     let report = world.json("out.json");
     assert_eq!(report["targets"], json!(9));
+    // A scene without cameras, as that of another sensor, is left out.
+    world.create_dir("test/000099");
+    eval(&world, "").warns(&["test/000099/scene_camera.json", "the scene is left out"]);
+    assert_eq!(world.json("out.json")["targets"], json!(9));
     // Rows are in the inverse order of the ground truth, so the first row is the visible car.
     assert_eq!(recalls(&report), [1.0; 5]);
 }

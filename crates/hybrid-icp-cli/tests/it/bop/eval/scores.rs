@@ -145,6 +145,11 @@ fn only_the_best_scores_are_evaluated() {
     write_results(world.path("in.csv"), &[worse, rows].concat()).unwrap();
     eval(&world, "").exits(0);
     assert_eq!(recalls(&world.json("out.json"))[2], 0.0);
+
+    // The target means the more visible of two cars, and the visibilities are not stated.
+    let target = r#"[{"scene_id": 3, "im_id": 0, "obj_id": 1, "inst_count": 1}]"#;
+    world.write("test_targets_bop19.json", target);
+    eval(&world, "").warns(&["scene_gt_info.json: no visib_fract of some instances"]);
 }
 
 #[test]
