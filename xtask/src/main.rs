@@ -49,8 +49,9 @@ cargo xtask COMMAND
             work of every preset on fixed scenes (pairs, renders, allocations, ...), against benches/counts.txt
   instructions
             instructions of every step, against the limits in benches/benches/instructions.rs
-  peers [--instances N]
-            small_gicp, Open3D and this library on the same arrays, as a Markdown table
+  peers [--instances N] [--rounds N] [--clouds]
+            small_gicp, Open3D and this library on the same arrays, as Markdown tables; with --clouds only point
+            clouds
   scale [--rows N] [--threads N] [--ray]
             `bop refine` on 20,000 generated rows: throughput, peak memory, kill and resume, shards; with --ray
             the same rows on N Ray workers; fails if the outputs differ
