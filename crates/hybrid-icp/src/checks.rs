@@ -1,6 +1,6 @@
 //! Checks of inputs and results, each of which is well-formed by itself.
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_4, PI};
 use std::sync::Arc;
 
 use hicp_core::internal::{bounds, median};
@@ -16,6 +16,8 @@ const PLAUSIBLE_DIAMETERS_METERS: std::ops::RangeInclusive<f64> = 0.002..=10.0;
 
 /// Share of the diameter that rounding the coordinates may cost.
 const COARSE: f64 = 1e-3;
+/// Largest distance by which a symmetry may move the center, diameters.
+const MOVED: f64 = 0.5;
 
 /// Largest factor between the measured depth and that of the initial pose.
 const DEPTH_RATIO: f64 = 3.0;
@@ -201,6 +203,15 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
     }
     if !model.has_possible_diameter() {
         warnings.extend(warning_of_diameter(model));
+    }
+    let center = model.center();
+    let symmetries = model.symmetries();
+    let half_turns = symmetries.continuous.iter().map(|axis| axis.rotation(PI));
+    let distances = symmetries.discrete.iter().copied().chain(half_turns);
+    let distances = distances.map(|motion| (motion * center - center).norm());
+    let distance = distances.fold(0.0, f64::max);
+    if distance > MOVED * diameter {
+        warnings.push(Warning::Symmetry { distance, diameter });
     }
     let step = model.mesh().coordinate_step();
     if step > COARSE * diameter {

@@ -28,6 +28,18 @@ pub enum Warning {
         /// Largest distance between two vertices that triangles use.
         measured: f64,
     },
+    /// A declared symmetry moves the object to another place: probably a wrong unit.
+    #[error(
+        "a declared symmetry moves the object's center by {}, with a diameter of {}: check the unit of its translation or offset",
+        Meters(*distance),
+        Meters(*diameter)
+    )]
+    Symmetry {
+        /// Distance by which it moves the center.
+        distance: f64,
+        /// Diameter of the model.
+        diameter: f64,
+    },
     /// The mesh is so far from its origin that `f32` rounds its shape.
     #[error(
         "the model's coordinates are so far from its origin that they are rounded to steps of {}, with a diameter of {}",
