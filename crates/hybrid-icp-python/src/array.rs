@@ -3,8 +3,8 @@
 use hybrid_icp::core::{Isometry3, Matrix3, Matrix6, Point3, Translation3, rotation_from_matrix};
 use numpy::ndarray::{ArrayView, Dimension};
 use numpy::{
-    AllowTypeChange, Element, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray,
-    PyUntypedArrayMethods,
+    AllowTypeChange, Element, PyArray1, PyArray2, PyArrayDescrMethods as _, PyArrayLikeDyn,
+    PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyMemoryView, PyString};
@@ -135,6 +135,13 @@ pub(crate) fn numbers<T: Element + Copy>(
 where
     for<'a, 'py> PyArrayLikeDyn<'py, T, AllowTypeChange>: FromPyObject<'a, 'py>,
 {
+    let value = &as_array(name, value)?;
+    // Text would be parsed, and complex numbers would lose a part.
+    if let Ok(array) = value.cast::<PyUntypedArray>()
+        && b"SUVcmM".contains(&array.dtype().kind())
+    {
+        return Err(unexpected(name, value, expected));
+    }
     let array = aligned(value)?
         .extract::<PyArrayLikeDyn<'_, T, AllowTypeChange>>()
         .map_err(|_| unexpected(name, value, expected))?;

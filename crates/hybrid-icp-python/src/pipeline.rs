@@ -431,7 +431,7 @@ impl PyPipeline {
                 let text = format!("threads is {threads}, expected 1 or more");
                 return Err(InputError::new_err(text));
             }
-            None => std::thread::available_parallelism().map_or(1, usize::from),
+            None => available_threads(),
         };
         let (object, observation) = (model.get(), observation.get());
         let distances: Vec<f64> = inits.iter().map(|init| object.z_at(init)).collect();
@@ -484,6 +484,7 @@ impl PyPipeline {
         threads: Option<i64>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("hybrid_icp._many")?;
+        let threads = threads.or_else(|| i64::try_from(available_threads()).ok());
         module.call_method1("refine", (slf, items, threads))
     }
 
@@ -583,4 +584,9 @@ impl PyPipeline {
         let by = compares_colors.then(|| self.__repr__());
         warnings::about_inputs(py, object, observation, distances, by)
     }
+}
+
+/// Returns the number of threads that the machine runs at once for this process.
+fn available_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }

@@ -311,6 +311,25 @@ def test_a_scale_in_millimeters_is_found_and_corrected(tmp_path):
         hi.read_depth(path, scale=-1)
     with pytest.raises(hi.InputError, match="median 800, .*divide the points by 1000"):
         hi.DepthImage.from_points([[0, 0, 800]], CAMERA)
+    with pytest.warns(hi.InputWarning, match="no point is in the image"):
+        hi.DepthImage.from_points([[0, 0, -0.8]], CAMERA)
+
+
+def test_infinite_depth_is_not_measured():
+    depth = np.full((48, 64), np.inf, np.float32)
+    depth[20:30, 20:30] = 0.8
+    image = hi.DepthImage(depth)
+    assert np.array_equal(image.to_numpy(), np.where(np.isinf(depth), 0, depth))
+
+
+def test_observations_share_a_pickled_image():
+    image = hi.DepthImage(np.full((48, 64), 0.8, np.float32))
+    observations = [hi.Observation(image, None, CAMERA) for _ in range(4)]
+    assert observations[0].image is image
+    text = pickle.dumps(observations)
+    assert len(text) < 2 * len(pickle.dumps(observations[0]))
+    twins = pickle.loads(text)
+    assert twins[0].image is twins[3].image and twins[0].image == image
 
 
 def test_files_of_numpy_are_read(tmp_path):

@@ -105,6 +105,11 @@ def test_masked_arrays_and_label_images_are_caught(scene):
     masked = np.ma.masked_less(scene.depth, 0.1)
     with pytest.raises(hi.InputError, match=r"depth is a masked array, .*depth\.filled"):
         hi.Observation(masked, scene.mask, scene.camera)
+    vertices = np.ma.masked_array(scene.model.vertices)
+    with pytest.raises(hi.InputError, match="vertices is a masked array"):
+        hi.Model(vertices, scene.model.faces)
+    with pytest.raises(hi.InputError, match="T_co is an array of <U32"):
+        hi.Pipeline().refine(scene.model, scene.observation, scene.rough.astype(str))
     labels = scene.mask.astype(np.uint8)
     labels[:5] = 7
     with pytest.warns(hi.InputWarning, match="mask has 2 values from 1 to 7: expected one object"):

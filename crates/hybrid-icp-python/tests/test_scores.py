@@ -74,6 +74,8 @@ def test_units_of_symmetries_follow_the_model(scene):
     errors = [hi.mssd(scene.rough, scene.true, model) for model in (meters, millimeters)]
     assert np.isclose(*errors, rtol=1e-4)
     assert errors[0] < hi.mssd(scene.rough, scene.true, scene.model)
+    with pytest.warns(hi.InputWarning, match="a declared symmetry moves the object's center by"):
+        hi.Model(scene.model.vertices, scene.model.faces, symmetry_axes=[([0, 0, 1], [10, 0, 0])])
 
 
 def pairs(seed=3, count=200):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -20,13 +19,13 @@ if TYPE_CHECKING:
 def refine(
     pipeline: Pipeline,
     items: Iterable[tuple[Model, Observation, npt.ArrayLike]],
-    threads: int | None,
+    threads: int,
 ) -> list[Result]:
     """Refines every item. The native code runs without the GIL, so threads suffice.
 
     Items are read as threads become free, so that an iterable of images needs little memory.
     """
-    if threads is not None and threads < 1:
+    if threads < 1:
         raise InputError(f"threads is {threads}, expected 1 or more")
 
     def result(index: int, item: tuple[Model, Observation, npt.ArrayLike]) -> Result:
@@ -35,7 +34,6 @@ def refine(
         except (InputError, InputWarning, TypeError) as error:
             raise type(error)(f"items[{index}]: {error}") from error
 
-    threads = threads or os.cpu_count() or 1
     results: list[Result] = []
     running: deque[Future[Result]] = deque()
     with ThreadPoolExecutor(threads) as pool:

@@ -266,6 +266,11 @@ class DepthImage:
         Returns
         -------
         DepthImage
+
+        Warns
+        -----
+        InputWarning
+            If no point is in the image.
         """
 
     @property
@@ -484,8 +489,8 @@ class Observation:
     ----------
     depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
         Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
-        more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
-        uint16. A `DepthImage` is shared, not copied.
+        more bits with `scale`. Pixels without a measurement are 0, negative, infinite or NaN, or
+        65535 in uint16. A `DepthImage` is shared, not copied.
     mask : numpy.ndarray of bool or uint8, shape (H, W) or (H, W, 1), or None
         Nonzero on the object. `None` selects every pixel. Other integers must be 0 and 1, or 0 and
         255.
@@ -1113,7 +1118,8 @@ class SequentialEstimator:
         InputWarning
             As for `Pipeline.refine`, while there is no estimate. If the images contradict `T_nc`:
             the event is "restarted", or two or more images, and as many as were accepted, do not
-            show the object at the pose that moved with the camera.
+            show the object at the pose that moved with the camera. If a filter makes this warning
+            an error, the step has been taken: `T_co` has its pose.
         """
 
     def move_camera(self, T_nc: npt.ArrayLike, covariance: npt.ArrayLike | None=None) -> None:
@@ -1193,7 +1199,7 @@ class Tracker:
     def __new__(cls, model: Model, camera: Camera, T_co: npt.ArrayLike, *, meters_per_second: float=0.3, degrees_per_second: float=90.0) -> Tracker:
         ...
 
-    def step(self, depth: DepthImage | npt.ArrayLike, seconds: float, mask: npt.ArrayLike | None=None, *, scale: float | None=None) -> Tracked:
+    def step(self, depth: DepthImage | _Depth, seconds: float, mask: _Mask | None=None, *, scale: float | None=None) -> Tracked:
         """Tracks the object in the next image.
 
         Parameters

@@ -47,11 +47,16 @@ def _plain(value: Any) -> Any:
         return [_plain(item) for item in value]
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
-    return _plain(value.to_dict()) if isinstance(value, StageEvent) else value
+    return value.to_dict() if isinstance(value, StageEvent) else value
 
 
 class _Record:
-    """A result that can be written as JSON."""
+    """A result that can be written as JSON. Its arrays are read-only."""
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all attributes but a model as plain Python values that `json.dumps` accepts.
@@ -148,7 +153,7 @@ class DecisionEvent:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StageEvent:
+class StageEvent(_Record):
     """An ICP stage that ended.
 
     Attributes
@@ -193,15 +198,6 @@ class StageEvent:
     iterations: int
     n_pairs: int
     mean_loss: float | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns all attributes except the pose as plain Python values.
-
-        Returns
-        -------
-        dict
-        """
-        return {key: value for key, value in vars(self).items() if key != "T_co"}
 
     def __repr__(self) -> str:
         parts = f"{self.selection}, {self.association}, {self.metric}"

@@ -116,10 +116,16 @@ impl PyDepthImage {
     /// Returns
     /// -------
     /// DepthImage
+    ///
+    /// Warns
+    /// -----
+    /// InputWarning
+    ///     If no point is in the image.
     #[staticmethod]
     #[pyo3(signature = (points, camera, T_cp = None))]
     #[allow(non_snake_case)]
     fn from_points(
+        py: Python<'_>,
         points: &Bound<'_, PyAny>,
         camera: &PyCamera,
         T_cp: Option<&Bound<'_, PyAny>>,
@@ -128,7 +134,13 @@ impl PyDepthImage {
         let pose = T_cp.map(|pose| array::motion_of_cloud(pose, "T_cp"));
         let pose = pose.transpose()?;
         let pose = pose.map_or_else(Isometry3::identity, |pose| pose.isometry);
+        let any = !points.is_empty();
         let image = DepthImage::from_points(points, &camera.0, &pose);
+        if any && image.pixels().iter().all(|z| *z == 0.0) {
+            let text = "no point is in the image: expected points in front of the camera, meters, \
+                        with z forward, or their pose T_cp, camera from points, meters";
+            errors::warn(py, text)?;
+        }
         check(&image, "divide the points by 1000")?;
         Ok(Self(Arc::new(image)))
     }
@@ -165,14 +177,17 @@ impl PyDepthImage {
 }
 
 /// Returns the image of a `DepthImage`, or reads an array.
-pub(crate) fn shared(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<Arc<DepthImage>> {
+pub(crate) fn shared<'py>(
+    value: &Bound<'py, PyAny>,
+    scale: Option<f64>,
+) -> PyResult<Bound<'py, PyDepthImage>> {
     match value.cast::<PyDepthImage>() {
-        Ok(image) if scale.is_none() => Ok(Arc::clone(&image.get().0)),
+        Ok(image) if scale.is_none() => Ok(image.clone()),
         Ok(_) => Err(InputError::new_err(
             "scale= was passed with depth as a DepthImage, which is in meters: expected scale= \
              where the DepthImage is created",
         )),
-        Err(_) => read(value, scale).map(Arc::new),
+        Err(_) => Bound::new(value.py(), PyDepthImage::new(value, scale)?),
     }
 }
 
@@ -301,9 +316,9 @@ fn warn_of_labels(value: &Bound<'_, PyAny>, mask: &ArrayView2<'_, u8>) -> PyResu
     Ok(())
 }
 
-/// Returns the median of the positive depths, or `None` if there are none.
+/// Returns the median of the measured depths, or `None` if there are none.
 fn median(depths: impl Iterator<Item = f32>) -> Option<f32> {
-    let mut positive: Vec<f32> = depths.filter(|z| *z > 0.0).collect();
+    let mut positive: Vec<f32> = depths.filter(|z| *z > 0.0 && z.is_finite()).collect();
     internal::median(&mut positive, f32::total_cmp)
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use hybrid_icp::core::{ColorImage, DepthImage, Mask, NormalWindow, Observation, PinholeCamera};
+use hybrid_icp::core::{DepthImage, Mask, NormalWindow, Observation, PinholeCamera};
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -15,7 +15,10 @@ use crate::input::depth::{self, PyDepthImage};
 use crate::input::model::PyModel;
 
 /// The positional and the named arguments that create an observation again.
-type Arguments<'py> = ((PyDepthImage, Matrix<bool>, PyCamera), Bound<'py, PyDict>);
+type Arguments<'py> = (
+    (Py<PyDepthImage>, Matrix<bool>, PyCamera),
+    Bound<'py, PyDict>,
+);
 
 /// Checks that a depth image has the size of its camera.
 fn check_size(
@@ -103,8 +106,8 @@ pub(crate) fn mask_in_box(
 /// ----------
 /// depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
 ///     Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
-///     more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
-///     uint16. A `DepthImage` is shared, not copied.
+///     more bits with `scale`. Pixels without a measurement are 0, negative, infinite or NaN, or
+///     65535 in uint16. A `DepthImage` is shared, not copied.
 /// mask : numpy.ndarray of bool or uint8, shape (H, W) or (H, W, 1), or None
 ///     Nonzero on the object. `None` selects every pixel. Other integers must be 0 and 1, or 0 and
 ///     255.
@@ -142,6 +145,8 @@ pub(crate) fn mask_in_box(
 #[derive(Debug)]
 pub(crate) struct PyObservation {
     pub(crate) observation: Observation,
+    /// The depth image of the observation, one object, so that pickling writes it once.
+    image: Py<PyDepthImage>,
 }
 
 #[pymethods]
@@ -158,13 +163,24 @@ impl PyObservation {
         normal_window: Option<u8>,
     ) -> PyResult<Self> {
         let image = depth::shared(depth, scale)?;
-        let mask = depth::mask(mask, &image)?;
+        let pixels = Arc::clone(&image.get().0);
+        let mask = depth::mask(mask, &pixels)?;
         let camera = camera.0;
-        check_size(&camera, depth, &image)?;
-        let color = color.map(|value| color::image(value, "color", Some(image.size())));
+        check_size(&camera, depth, &pixels)?;
+        let color = color.map(|value| color::image(value, "color", Some(pixels.size())));
         let color = color.transpose()?;
         let window = normal_window.map_or(NormalWindow::Automatic, NormalWindow::HalfSide);
-        py.detach(|| Self::make(image, mask, camera, color, window))
+        let observation = py.detach(|| {
+            let observation = Observation::with_normal_window(pixels, mask, camera, window)?;
+            match color {
+                Some(color) => observation.with_color(color),
+                None => Ok(observation),
+            }
+        });
+        Ok(Self {
+            observation: observation.map_err(errors::input)?,
+            image: image.unbind(),
+        })
     }
 
     /// The camera.
@@ -177,15 +193,15 @@ impl PyObservation {
     /// measurement.
     #[getter]
     fn depth(&self) -> Matrix<f32> {
-        self.image().to_numpy()
+        self.image.get().to_numpy()
     }
 
     /// The depth image as a `DepthImage`, (H, W) meters, for observations with other masks.
     ///
     /// It is shared and not copied.
     #[getter]
-    fn image(&self) -> PyDepthImage {
-        PyDepthImage(Arc::clone(self.observation.shared_depth()))
+    fn image(&self, py: Python<'_>) -> Py<PyDepthImage> {
+        self.image.clone_ref(py)
     }
 
     /// A copy of the mask, shape (H, W), bool.
@@ -320,7 +336,7 @@ impl PyObservation {
         if let NormalWindow::HalfSide(pixels) = self.observation.normal_window() {
             options.set_item("normal_window", pixels)?;
         }
-        Ok(((self.image(), self.mask(), self.camera()), options))
+        Ok(((self.image(py), self.mask(), self.camera()), options))
     }
 
     fn _repr_png_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
@@ -337,22 +353,5 @@ impl PyObservation {
             self.n_measured(),
             self.n_surfels()
         )
-    }
-}
-
-impl PyObservation {
-    fn make(
-        depth: Arc<DepthImage>,
-        mask: Mask,
-        camera: PinholeCamera,
-        color: Option<ColorImage>,
-        window: NormalWindow,
-    ) -> PyResult<Self> {
-        let observation = Observation::with_normal_window(depth, mask, camera, window);
-        let mut observation = observation.map_err(errors::input)?;
-        if let Some(color) = color {
-            observation = observation.with_color(color).map_err(errors::input)?;
-        }
-        Ok(Self { observation })
     }
 }

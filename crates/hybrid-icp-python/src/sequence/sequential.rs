@@ -110,7 +110,8 @@ impl PySequentialEstimator {
     /// InputWarning
     ///     As for `Pipeline.refine`, while there is no estimate. If the images contradict `T_nc`:
     ///     the event is "restarted", or two or more images, and as many as were accepted, do not
-    ///     show the object at the pose that moved with the camera.
+    ///     show the object at the pose that moved with the camera. If a filter makes this warning
+    ///     an error, the step has been taken: `T_co` has its pose.
     #[pyo3(signature = (observation, T_nc = None, covariance = None))]
     fn step<'py>(
         &self,

@@ -1,6 +1,6 @@
 //! `Tracker`.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use hybrid_icp::checks::warning_of_distance;
 use hybrid_icp::core::Isometry3;
@@ -150,7 +150,7 @@ impl PyTracker {
             let text = format!("seconds is {seconds}, expected {expected}");
             return Err(InputError::new_err(text));
         }
-        let depth = depth::shared(depth, scale)?;
+        let depth = Arc::clone(&depth::shared(depth, scale)?.get().0);
         let mask = mask
             .map(|mask| depth::mask(Some(mask), &depth))
             .transpose()?;
