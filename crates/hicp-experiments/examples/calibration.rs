@@ -19,7 +19,7 @@ use hybrid_icp::{Calibration, Preset};
 type Failed = Box<dyn std::error::Error>;
 
 const SEED: u64 = 5;
-/// Seconds per estimate. Both pipelines get the same number of images.
+/// Seconds per estimate. All pipelines get the same number of images.
 const SECONDS: f64 = 0.3;
 
 /// An estimate and its error.
@@ -38,7 +38,11 @@ fn main() -> Result<(), Failed> {
     let trajectories = std::env::args()
         .nth(1)
         .map_or(Ok(10), |text| text.parse())?;
-    for preset in [Preset::Hybrid, Preset::ProjectiveCascadePointPlane] {
+    for preset in [
+        Preset::Hybrid,
+        Preset::ProjectiveCascadePointPlane,
+        Preset::Auto,
+    ] {
         let shipped = Calibration::of(preset);
         let tuning = samples(&Household::TUNING, preset, trajectories)?;
         let test = samples(&Household::TEST, preset, trajectories)?;

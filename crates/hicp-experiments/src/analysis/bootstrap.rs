@@ -165,9 +165,11 @@ impl Analysis {
         };
         if metric.is_share() && interval.low >= interval.high {
             let unseen = never_seen(cases);
-            // No share is below 0 or above 1.
-            let bound =
-                |sign: f64| -> f64 { terms.iter().map(|t| t.2).filter(|f| f * sign > 0.0).sum() };
+            // No share is below 0 or above 1. The sum of no terms would be −0.
+            let bound = |sign: f64| {
+                let factors = terms.iter().map(|t| t.2).filter(|f| f * sign > 0.0);
+                factors.fold(0.0, std::ops::Add::add)
+            };
             interval.low = (estimate - unseen).max(bound(-1.0));
             interval.high = (estimate + unseen).min(bound(1.0));
         }

@@ -46,7 +46,7 @@ pub(crate) struct Arguments {
     /// are undistorted, and the poses belong to the undistorted images.
     #[arg(long, value_name = "FILE")]
     camera: PathBuf,
-    /// The rough pose in the first image, in a form of `refine`.
+    /// The rough pose in the first image, in a form of `refine`, such as the output of `estimate`.
     #[arg(long, value_name = "FILE")]
     init: PathBuf,
     /// Unit of the translation of --init: m, mm or cm. If not given: mm for cam_t_m2c, m for all

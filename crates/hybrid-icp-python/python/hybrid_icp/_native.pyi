@@ -1086,15 +1086,15 @@ class SequentialEstimator:
         camera. Otherwise uncertainty refers to the center of the object, estimates with an MVE
         above 0.4 are rejected, and symmetric poses are fused as one.
     covariance : {"mve", "calibrated"}, optional
-        Covariance of the estimates. "mve" is a weight: the MVE in units of the object. It compares
-        images and is not calibrated, so do not use it as an error. "calibrated" is about as wide as
-        the errors: the covariance of the registration, with factors that were fitted to "hybrid"
-        and to models reconstructed from images. It also rejects estimates with an MVE above 0.25,
-        and those that are far from the fused pose. It excludes `paper`. `bop sequence` names them
-        `--uncertainty mve` and `--uncertainty registration`, and the latter is its default.
+        Covariance of the estimates. "calibrated", the default without `paper`, is at least about as
+        wide as the errors: the covariance of the registration, with factors that were fitted to
+        "hybrid" and to models reconstructed from images. It also rejects estimates with an MVE
+        above 0.25, and those that are far from the fused pose. "mve" is a weight: the MVE in units
+        of the object. It compares images and is not calibrated, so do not use it as an error.
+        `bop sequence` names them `--uncertainty registration` and `--uncertainty mve`.
     """
 
-    def __new__(cls, pipeline: Pipeline, method: str, model: Model, T_co: npt.ArrayLike, *, paper: bool=False, covariance: Literal['mve', 'calibrated']='mve') -> SequentialEstimator:
+    def __new__(cls, pipeline: Pipeline, method: str, model: Model, T_co: npt.ArrayLike, *, paper: bool=False, covariance: Literal['mve', 'calibrated'] | None=None) -> SequentialEstimator:
         ...
 
     def step(self, observation: Observation, T_nc: npt.ArrayLike | None=None, covariance: npt.ArrayLike | None=None) -> SequentialStep:

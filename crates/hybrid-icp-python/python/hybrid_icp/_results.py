@@ -502,8 +502,8 @@ class SequentialStep(_Record):
     T_co : numpy.ndarray, shape (4, 4), float64
         The fused pose, meters. While there is no estimate, the initial pose moved with the camera.
     covariance : numpy.ndarray, shape (6, 6), float64, or None
-        Its covariance of ξ = [ρ; φ]; None while there is no estimate. It is calibrated only with
-        `SequentialEstimator(covariance="calibrated")`.
+        Its covariance of ξ = [ρ; φ]; None while there is no estimate. It is not calibrated with
+        `SequentialEstimator(covariance="mve")` or `paper=True`.
     T_init : numpy.ndarray, shape (4, 4), float64
         The pose that ICP started from, meters: the last fused pose, moved with the camera.
     T_registered : numpy.ndarray, shape (4, 4), float64

@@ -34,12 +34,12 @@ use crate::sequence::fusion::{self, PyPoseEstimate};
 ///     camera. Otherwise uncertainty refers to the center of the object, estimates with an MVE
 ///     above 0.4 are rejected, and symmetric poses are fused as one.
 /// covariance : {"mve", "calibrated"}, optional
-///     Covariance of the estimates. "mve" is a weight: the MVE in units of the object. It compares
-///     images and is not calibrated, so do not use it as an error. "calibrated" is about as wide as
-///     the errors: the covariance of the registration, with factors that were fitted to "hybrid"
-///     and to models reconstructed from images. It also rejects estimates with an MVE above 0.25,
-///     and those that are far from the fused pose. It excludes `paper`. `bop sequence` names them
-///     `--uncertainty mve` and `--uncertainty registration`, and the latter is its default.
+///     Covariance of the estimates. "calibrated", the default without `paper`, is at least about as
+///     wide as the errors: the covariance of the registration, with factors that were fitted to
+///     "hybrid" and to models reconstructed from images. It also rejects estimates with an MVE
+///     above 0.25, and those that are far from the fused pose. "mve" is a weight: the MVE in units
+///     of the object. It compares images and is not calibrated, so do not use it as an error.
+///     `bop sequence` names them `--uncertainty registration` and `--uncertainty mve`.
 #[pyclass(frozen, module = "hybrid_icp", name = "SequentialEstimator")]
 pub(crate) struct PySequentialEstimator {
     estimator: Mutex<SequentialEstimator>,
@@ -53,19 +53,20 @@ pub(crate) struct PySequentialEstimator {
 #[allow(non_snake_case)]
 impl PySequentialEstimator {
     #[new]
-    #[pyo3(signature = (pipeline, method, model, T_co, *, paper = false, covariance = "mve"))]
+    #[pyo3(signature = (pipeline, method, model, T_co, *, paper = false, covariance = None))]
     fn new(
         pipeline: &Bound<'_, PyPipeline>,
         method: &str,
         model: &Bound<'_, PyModel>,
         T_co: &Bound<'_, PyAny>,
         paper: bool,
-        covariance: &str,
+        covariance: Option<&str>,
     ) -> PyResult<Self> {
         let method: FusionMethod = method.parse().map_err(errors::input)?;
         let init = array::motion(T_co, "T_co")?.isometry;
         let choices = [("mve", false), ("calibrated", true)];
-        let calibrated = array::choice("covariance", covariance, choices)?;
+        let covariance = covariance.map(|name| array::choice("covariance", name, choices));
+        let calibrated = covariance.transpose()?.unwrap_or(!paper);
         let stage = pipeline.get().build()?;
         let object = &model.get().model;
         let estimator = match (paper, calibrated) {

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context as _, Error, bail};
-use clap::{Arg, Args, ValueEnum};
+use clap::{Args, ValueEnum};
 use hicp_bop::{MaskSource, Scenes};
 use hicp_io::bop::{ResultRow, Scene};
 use hybrid_icp::core::{Isometry3, Model};
@@ -45,7 +45,6 @@ use crate::track::steps::distrust;
 /// is missing or damaged. If this is detected during the run, the lines are still written.
 #[derive(Debug, Args)]
 #[command(override_usage = USAGE, after_help = EXAMPLE)]
-#[command(mut_arg("pipeline", follows))]
 pub(crate) struct Arguments {
     #[command(flatten)]
     follow: FollowOptions,
@@ -63,21 +62,13 @@ pub(crate) struct Arguments {
     pipeline: PipelineArguments,
 }
 
-/// Makes `hybrid` the default: its covariances and gate are calibrated, and it never searches.
-fn follows(pipeline: Arg) -> Arg {
-    let help = "The pipeline: a name (`hybrid-icp pipelines` lists them) or a TOML file. Covariances are calibrated for `hybrid`; \
-        with `auto` and `search`, poses may jump from one image to the next";
-    pipeline.default_value("hybrid").long_help(help)
-}
-
 /// The source of an estimate's covariance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Uncertainty {
     /// The calibrated covariance of the registration, with a gate on the Mahalanobis distance (in
     /// Python `covariance="calibrated"`).
     Registration,
-    /// The MVE alone, as in the paper, around the object's center (`covariance="mve"`, the default
-    /// in Python).
+    /// The MVE alone, as in the paper, around the object's center (`covariance="mve"`).
     Mve,
 }
 
