@@ -17,7 +17,9 @@ use hybrid_icp::core::{
 };
 use hybrid_icp::icp::Workspace;
 use hybrid_icp::metric::Minimize;
-use hybrid_icp::metric::{Conditioned, Degeneracy, Observability, PointToPlane, PointToPoint};
+use hybrid_icp::metric::{
+    Conditioned, Degeneracy, Observability, PointToPlane, PointToPoint, Step,
+};
 use hybrid_icp::raster::Rasterizer;
 
 /// Distance of the surfaces' origin from the camera, meters.
@@ -121,28 +123,20 @@ fn run(
     for _ in 0..12 {
         pairs.begin(&pose, exact.0.len());
         Projective.associate(&mut context, &exact.0, &pose, &mut pairs);
-        let observability = metric
-            .system(&Iteration::default(), &pairs)
-            .unwrap()
-            .observability()
-            .unwrap();
-        let step = metric.minimize(&Iteration::default(), &pairs).unwrap();
-        let (pivot, length) = (observability.pivot.coords, observability.length);
+        let seen = observability(&mut metric, &pairs);
+        let next = step(&mut metric, &pairs).unwrap();
+        let (pivot, length) = (seen.pivot.coords, seen.length);
         let shift = |by: Vector3<f64>| Isometry3::translation(by.x, by.y, by.z);
-        let twist = se3::log(&(shift(-pivot) * step.increment * shift(pivot)));
+        let twist = se3::log(&(shift(-pivot) * next.increment * shift(pivot)));
         let scaled = Vector6::from_fn(|i, _| if i < 3 { twist[i] } else { twist[i] * length });
-        let (observability, size) = *first.get_or_insert((observability, scaled.norm()));
-        let n = observability.n_degenerate(Degeneracy::THRESHOLD);
-        let open = metric
-            .system(&Iteration::default(), &pairs)
-            .unwrap()
-            .observability()
-            .unwrap();
+        let (seen, size) = *first.get_or_insert((seen, scaled.norm()));
+        let n = seen.n_degenerate(Degeneracy::THRESHOLD);
+        let open = observability(&mut metric, &pairs);
         for direction in &open.directions[..n] {
             slide = slide.max(direction.dot(&scaled).abs() / size);
         }
-        before.get_or_insert(step.mean_loss.sqrt());
-        pose = step.increment * pose;
+        before.get_or_insert(next.mean_loss.sqrt());
+        pose = next.increment * pose;
     }
     pairs.begin(&pose, exact.0.len());
     Projective.associate(&mut context, &exact.0, &pose, &mut pairs);
@@ -155,6 +149,15 @@ fn run(
         slide,
         rms: (before.unwrap(), after),
     }
+}
+
+fn step(metric: &mut impl Minimize, pairs: &Correspondences) -> Option<Step> {
+    metric.minimize(&Iteration::default(), pairs)
+}
+
+fn observability(metric: &mut impl Minimize, pairs: &Correspondences) -> Observability {
+    let system = metric.system(&Iteration::default(), pairs).unwrap();
+    system.observability().unwrap()
 }
 
 /// Returns the length of a scaled twist's part in the space of orthonormal others.
@@ -295,20 +298,13 @@ fn a_line_of_points_leaves_the_rotation_around_it_open() {
             policy,
             threshold: Degeneracy::THRESHOLD,
         };
-        let found = metric
-            .system(&Iteration::default(), &pairs)
-            .unwrap()
-            .observability()
-            .unwrap();
+        let found = observability(&mut metric, &pairs);
         assert_eq!(found.n_degenerate(Degeneracy::THRESHOLD), 1, "{found:?}");
         let turn = unit_twist(&found, Vector3::zeros(), along, middle);
         assert!(turn.dot(&found.directions[0]).abs() > 0.999, "{found:?}");
         // The full translation between the pairs is found, and there is no rotation around the
         // line.
-        let increment = metric
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let increment = step(&mut metric, &pairs).unwrap().increment;
         let left = (motion.inverse() * increment).translation.vector.norm();
         assert!(left < 1e-6, "{policy:?}: {increment}");
         assert!(increment.rotation.scaled_axis().dot(&along).abs() < 1e-6 * 0.0037 / 0.06);
@@ -338,29 +334,18 @@ fn five_points_determine_a_step_by_distances_but_not_by_planes() {
             policy,
             threshold,
         };
-        assert_eq!(planes.minimize(&Iteration::default(), &pairs), None);
-        let open = planes
-            .system(&Iteration::default(), &pairs)
-            .unwrap()
-            .observability()
-            .unwrap();
+        assert_eq!(step(&mut planes, &pairs), None);
+        let open = observability(&mut planes, &pairs);
         assert_eq!(open.n_degenerate(threshold), 3, "{open:?}");
         let mut distances = Conditioned {
             metric: PointToPoint,
             policy,
             threshold,
         };
-        let open = distances
-            .system(&Iteration::default(), &pairs)
-            .unwrap()
-            .observability()
-            .unwrap();
+        let open = observability(&mut distances, &pairs);
         assert_eq!(open.n_degenerate(threshold), 0, "{open:?}");
         // The error of a Gauss–Newton step of 2·10⁻³ rad is its square.
-        let increment = distances
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let increment = step(&mut distances, &pairs).unwrap().increment;
         let (angle, distance) = se3::pose_distance(&increment, &motion);
         assert!(
             angle < 1e-5 && distance < 1e-5,

@@ -1,7 +1,6 @@
 //! Tests that frozen components are exactly zero, and that the rest is the constrained minimum.
 
-use crate::scenes::{Numbers, at, center, difference, exact, messy, surfel};
-use hicp_core::Iteration;
+use crate::scenes::{AtStart, Numbers, at, center, difference, exact, posed, surfel};
 use hicp_core::{Correspondences, Isometry3, Point3, Vector3, Vector6, se3, so3};
 use hicp_metric::Minimize;
 use hicp_metric::{
@@ -20,12 +19,6 @@ fn components(frame: Frame, pose: &Isometry3<f64>, increment: &Isometry3<f64>) -
     let shift = axes.inverse() * (increment * origin - origin);
     let turn = axes.inverse() * so3::log(&increment.rotation);
     [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
-}
-
-fn posed(numbers: &mut Numbers, count: usize) -> Correspondences {
-    let pose =
-        Isometry3::translation(0.02, -0.03, 0.58) * numbers.motion(&Point3::origin(), 80.0, 0.0);
-    at(&pose, &messy(numbers, count))
 }
 
 fn masks() -> impl Iterator<Item = ([bool; 3], [bool; 3])> {
@@ -55,9 +48,7 @@ fn frozen_components_are_zero_and_the_others_move() {
         let pairs = posed(&mut numbers, 80);
         for frame in [Frame::Camera, Frame::Object] {
             for mask in masks() {
-                let step = frozen(metric, frame, mask)
-                    .minimize(&Iteration::default(), &pairs)
-                    .unwrap();
+                let step = frozen(metric, frame, mask).step(&pairs).unwrap();
                 let found = components(frame, pairs.camera_from_object(), &step.increment);
                 let held = [mask.0, mask.1].concat();
                 for (i, (x, held)) in found.iter().zip(held).enumerate() {
@@ -84,11 +75,11 @@ fn frozen_components_are_zero_to_the_bit() {
     let none = [false; 3];
     for frame in [Frame::Camera, Frame::Object] {
         let step = frozen(PointToPlane, frame, (all, all))
-            .minimize(&Iteration::default(), &pairs)
+            .step(&pairs)
             .unwrap();
         assert_eq!(step.increment, Isometry3::identity());
         let step = frozen(PointToPlane, frame, (none, all))
-            .minimize(&Iteration::default(), &pairs)
+            .step(&pairs)
             .unwrap();
         assert_eq!(step.increment.rotation, Isometry3::identity().rotation);
     }
@@ -98,10 +89,7 @@ fn frozen_components_are_zero_to_the_bit() {
             metric: frozen(PointToPlane, Frame::Camera, mask),
             ..Conditioned::default()
         };
-        let increment = metric
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let increment = metric.step(&pairs).unwrap().increment;
         let turn = increment.rotation.imag();
         for axis in 0..3 {
             assert!(!mask.1[axis] || turn[axis] == 0.0, "{mask:?} {turn}");
@@ -111,7 +99,7 @@ fn frozen_components_are_zero_to_the_bit() {
     }
     let hold = ([false, false, true], all);
     let step = frozen(PointToPoint, Frame::Camera, hold)
-        .minimize(&Iteration::default(), &pairs)
+        .step(&pairs)
         .unwrap();
     assert_eq!(step.increment.translation.z.to_bits(), 0.0_f64.to_bits());
 }
@@ -123,17 +111,17 @@ fn nothing_frozen_equals_the_inner_metric() {
     let none = ([false; 3], [false; 3]);
     for frame in [Frame::Camera, Frame::Object] {
         assert_eq!(
-            frozen(PointToPoint, frame, none).minimize(&Iteration::default(), &pairs),
-            PointToPoint.minimize(&Iteration::default(), &pairs)
+            frozen(PointToPoint, frame, none).step(&pairs),
+            PointToPoint.step(&pairs)
         );
         assert_eq!(
-            frozen(PointToPlane, frame, none).system(&Iteration::default(), &pairs),
-            PointToPlane.system(&Iteration::default(), &pairs)
+            frozen(PointToPlane, frame, none).normal_equations(&pairs),
+            PointToPlane.normal_equations(&pairs)
         );
     }
     assert_eq!(
-        Frozen::<PointToPoint>::default().minimize(&Iteration::default(), &pairs),
-        PointToPoint.minimize(&Iteration::default(), &pairs)
+        Frozen::<PointToPoint>::default().step(&pairs),
+        PointToPoint.step(&pairs)
     );
 }
 
@@ -155,7 +143,7 @@ fn the_free_components_are_at_the_constrained_minimum() {
         Frame::Camera,
         ([false, true, false], [true; 3]),
     )
-    .minimize(&Iteration::default(), &pairs)
+    .step(&pairs)
     .unwrap()
     .increment
     .translation
@@ -174,10 +162,7 @@ fn the_free_components_are_at_the_constrained_minimum() {
         for mask in masks() {
             let mut solved = GaussNewton::new(frozen(PointToPoint, frame, mask));
             (solved.max_iterations, solved.tolerance) = (30, 0.0);
-            let end = solved
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap()
-                .increment;
+            let end = solved.step(&pairs).unwrap().increment;
             let held = [mask.0, mask.1].concat();
             for component in (0..6).filter(|i| !held[*i]) {
                 // Along one component, from the position of the object after a motion.
@@ -222,7 +207,7 @@ fn exact_pairs_are_aligned_by_a_rotation_around_the_objects_axis() {
         let pairs = at(&pose, &exact(&source, &motion));
         let only_z = ([true; 3], [true, true, false]);
         let mut metric = GaussNewton::new(frozen(PointToPoint, Frame::Object, only_z));
-        let step = metric.minimize(&Iteration::default(), &pairs).unwrap();
+        let step = metric.step(&pairs).unwrap();
         let (angle, distance) = difference(&step.increment, &motion);
         assert!(angle < 1e-6 && distance < 1e-7, "{angle} {distance}");
         // If the rotation is frozen, the object does not rotate.
@@ -231,14 +216,7 @@ fn exact_pairs_are_aligned_by_a_rotation_around_the_objects_axis() {
             Frame::Object,
             ([false; 3], [false, false, true]),
         );
-        let found = components(
-            Frame::Object,
-            &pose,
-            &held
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap()
-                .increment,
-        );
+        let found = components(Frame::Object, &pose, &held.step(&pairs).unwrap().increment);
         assert!(found[5].abs() < 1e-15);
     }
 }
@@ -247,15 +225,12 @@ fn exact_pairs_are_aligned_by_a_rotation_around_the_objects_axis() {
 fn as_many_rows_as_unknowns_are_enough() {
     let mut numbers = Numbers(56);
     let pairs = posed(&mut numbers, 3);
-    assert_eq!(PointToPlane.minimize(&Iteration::default(), &pairs), None);
+    assert_eq!(PointToPlane.step(&pairs), None);
     let mut shift = frozen(PointToPlane, Frame::Camera, ([false; 3], [true; 3]));
-    assert!(shift.minimize(&Iteration::default(), &pairs).is_some());
+    assert!(shift.step(&pairs).is_some());
     let one: Correspondences = pairs.as_slice()[..1].iter().copied().collect();
-    assert_eq!(shift.minimize(&Iteration::default(), &one), None);
-    assert_eq!(
-        shift.minimize(&Iteration::default(), &Correspondences::new()),
-        None
-    );
+    assert_eq!(shift.step(&one), None);
+    assert_eq!(shift.step(&Correspondences::new()), None);
 }
 
 #[test]
@@ -277,7 +252,7 @@ fn solvers_and_policies_respect_frozen_components() {
         Box::new(LevenbergMarquardt::new(frozen)),
     ];
     for mut metric in metrics {
-        let step = metric.minimize(&Iteration::default(), &pairs).unwrap();
+        let step = metric.step(&pairs).unwrap();
         let found = components(Frame::Object, &pose, &step.increment);
         for (i, x) in found.iter().enumerate() {
             assert!(i == 1 || x.abs() < 1e-14, "{}: {i} {x}", metric.label());
@@ -287,7 +262,7 @@ fn solvers_and_policies_respect_frozen_components() {
     // The covariance is that of the free components.
     let covariance = frozen
         .clone()
-        .system(&Iteration::default(), &pairs)
+        .normal_equations(&pairs)
         .unwrap()
         .covariance()
         .unwrap();
@@ -338,7 +313,7 @@ fn same_for_all_origins(mask: ([bool; 3], [bool; 3]), pairs: &Correspondences, t
                 ..Conditioned::default()
             };
             let system = frozen(metric, Frame::Camera, mask)
-                .system(&Iteration::default(), &pairs)
+                .normal_equations(&pairs)
                 .unwrap();
             (system.solve().unwrap(), system.covariance().unwrap())
         });

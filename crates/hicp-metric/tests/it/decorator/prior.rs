@@ -1,6 +1,6 @@
 //! Tests of the prior and its limits.
 
-use crate::scenes::{Numbers, at, center, difference, messy, surfel};
+use crate::scenes::{AtStart, Numbers, at, center, difference, posed, surfel};
 use hicp_core::Iteration;
 use hicp_core::{
     Correspondences, Isometry3, Matrix6, Pair, Point3, Problem, Vector3, Vector6, se3,
@@ -9,12 +9,6 @@ use hicp_metric::Minimize;
 use hicp_metric::{
     GaussNewton, NormalEquations, PointToPlane, PointToPoint, PosePrior, Prior, Robust, WeightedSum,
 };
-
-fn posed(numbers: &mut Numbers, count: usize) -> Correspondences {
-    let pose =
-        Isometry3::translation(0.02, -0.03, 0.58) * numbers.motion(&Point3::origin(), 80.0, 0.0);
-    at(&pose, &messy(numbers, count))
-}
 
 fn prior<M>(metric: M, mean: &Isometry3<f64>, information: Matrix6<f64>) -> PosePrior<M> {
     let prior = Prior::Gaussian {
@@ -36,26 +30,18 @@ fn without_information_it_equals_the_inner_metric() {
     let pairs = posed(&mut numbers, 80);
     let elsewhere = numbers.motion(&center(), 50.0, 0.3);
     let mut flat = prior(PointToPoint, &elsewhere, Matrix6::zeros());
+    assert_eq!(flat.step(&pairs), PointToPoint.step(&pairs));
     assert_eq!(
-        flat.minimize(&Iteration::default(), &pairs),
-        PointToPoint.minimize(&Iteration::default(), &pairs)
-    );
-    assert_eq!(
-        flat.system(&Iteration::default(), &pairs),
-        PointToPoint.system(&Iteration::default(), &pairs)
+        flat.normal_equations(&pairs),
+        PointToPoint.normal_equations(&pairs)
     );
     let mut default = PosePrior::<PointToPlane>::default();
-    assert_eq!(
-        default.minimize(&Iteration::default(), &pairs),
-        PointToPlane.minimize(&Iteration::default(), &pairs)
-    );
+    assert_eq!(default.step(&pairs), PointToPlane.step(&pairs));
     // Very little information changes very little.
     let mut weak = prior(PointToPlane, &elsewhere, Matrix6::identity() * 1e-9);
     let (a, b) = (
-        weak.minimize(&Iteration::default(), &pairs).unwrap(),
-        PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap(),
+        weak.step(&pairs).unwrap(),
+        PointToPlane.step(&pairs).unwrap(),
     );
     assert!(difference(&a.increment, &b.increment).0 < 1e-9);
 }
@@ -69,11 +55,7 @@ fn a_strong_prior_fixes_the_pose() {
         let mean = numbers.motion(&center(), degrees, 0.05) * pose;
         let information = random_information(&mut numbers, 1e16);
         let mut pinned = prior(PointToPlane, &mean, information);
-        let next = pinned
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment
-            * pose;
+        let next = pinned.step(&pairs).unwrap().increment * pose;
         let (angle, distance) = se3::pose_distance(&next, &mean);
         assert!(
             angle < 1e-7 && distance < 1e-7,
@@ -92,12 +74,7 @@ fn a_prior_of_one_direction_does_not_damp_the_others() {
         let mut information = Matrix6::zeros();
         information[(2, 2)] = stiffness;
         let mut metric = prior(PointToPlane, pairs.camera_from_object(), information);
-        se3::log(
-            &metric
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap()
-                .increment,
-        )
+        se3::log(&metric.step(&pairs).unwrap().increment)
     };
     // The information of the data is about 60 here, that of the prior 10⁶ and 10⁹.
     let (stiff, stiffer) = (step(1e12), step(1e15));
@@ -121,10 +98,7 @@ fn the_minimum_is_that_of_the_documented_sum() {
         let mut metric = GaussNewton::new(prior(PointToPoint, &mean, information));
         metric.max_iterations = 30;
         metric.tolerance = 0.0;
-        let increment = metric
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let increment = metric.step(&pairs).unwrap().increment;
         let sigma = metric.metric.sigma_meters;
         let sum = |t: &Isometry3<f64>| {
             let data: f64 = pairs
@@ -151,10 +125,7 @@ fn the_minimum_is_that_of_the_documented_sum() {
             );
         }
         let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
-        let mean_loss = metric
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .mean_loss;
+        let mean_loss = metric.step(&pairs).unwrap().mean_loss;
         let expected = sum(&Isometry3::identity()) / weight;
         assert!((mean_loss - expected).abs() < 1e-9 * expected);
     }
@@ -167,15 +138,9 @@ fn information_adds_up() {
     let information = random_information(&mut numbers, 1e5);
     // At the mean, the left Jacobian is the identity.
     let mut metric = prior(PointToPlane, pairs.camera_from_object(), information);
-    let sum = metric
-        .system(&Iteration::default(), &pairs)
-        .unwrap()
-        .information();
-    let expected = PointToPlane
-        .system(&Iteration::default(), &pairs)
-        .unwrap()
-        .information()
-        + information * 1e-6;
+    let sum = metric.normal_equations(&pairs).unwrap().information();
+    let expected =
+        PointToPlane.normal_equations(&pairs).unwrap().information() + information * 1e-6;
     assert!((sum - expected).amax() < 1e-12 * expected.amax());
 }
 
@@ -188,12 +153,9 @@ fn a_prior_replaces_rows_but_not_pairs() {
         pairs.camera_from_object(),
         Matrix6::identity(),
     );
-    assert_eq!(PointToPlane.minimize(&Iteration::default(), &pairs), None);
-    assert!(metric.minimize(&Iteration::default(), &pairs).is_some());
-    assert_eq!(
-        metric.minimize(&Iteration::default(), &Correspondences::new()),
-        None
-    );
+    assert_eq!(PointToPlane.step(&pairs), None);
+    assert!(metric.step(&pairs).is_some());
+    assert_eq!(metric.step(&Correspondences::new()), None);
 }
 
 #[test]
@@ -208,14 +170,8 @@ fn a_boxed_or_decorated_prior_stays_in_effect() {
         Matrix6::identity() * 1e16,
     );
     let mut boxed: Box<dyn Minimize> = Box::new(pin.clone());
-    assert_eq!(
-        boxed.minimize(&Iteration::default(), &pairs),
-        pin.clone().minimize(&Iteration::default(), &pairs)
-    );
-    assert_eq!(
-        boxed.mean_loss(&Iteration::default(), &pairs),
-        pin.clone().mean_loss(&Iteration::default(), &pairs)
-    );
+    assert_eq!(boxed.step(&pairs), pin.clone().step(&pairs));
+    assert_eq!(boxed.loss(&pairs), pin.clone().loss(&pairs));
     let metrics: [Box<dyn Minimize>; 3] = [
         Box::new(GaussNewton::new(pin.clone())),
         Box::new(hicp_metric::LevenbergMarquardt::new(pin.clone())),
@@ -225,11 +181,7 @@ fn a_boxed_or_decorated_prior_stays_in_effect() {
         }),
     ];
     for mut metric in metrics {
-        let next = metric
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment
-            * pose;
+        let next = metric.step(&pairs).unwrap().increment * pose;
         let (angle, distance) = se3::pose_distance(&next, &mean);
         assert!(
             angle < 1e-5 && distance < 1e-5,
@@ -255,10 +207,8 @@ fn a_prior_around_the_initial_pose() {
     let mut metric = PosePrior::new(PointToPlane, prior, 1e-3);
     let at = |index, init| Iteration::new(index, init, Problem::default());
     let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
-    let loss = metric.mean_loss(&at(0, &init), &pairs).unwrap()
-        - PointToPlane
-            .mean_loss(&Iteration::default(), &pairs)
-            .unwrap();
+    let loss =
+        metric.mean_loss(&at(0, &init), &pairs).unwrap() - PointToPlane.loss(&pairs).unwrap();
     // To first order, the twist around the object's origin is its displacement and the rotation
     // vector. 4° and 1 cm are small.
     let turn = (pose.rotation * init.rotation.inverse()).scaled_axis();
@@ -321,7 +271,7 @@ fn the_covariance_is_that_of_the_posterior() {
     let information = random_information(&mut numbers, 1e5);
     let mut metric = prior(PointToPlane, pairs.camera_from_object(), information);
     metric.sigma_meters = 2e-3;
-    let system = |metric: &mut dyn Minimize| metric.system(&Iteration::default(), &pairs).unwrap();
+    let system = |metric: &mut dyn Minimize| metric.normal_equations(&pairs).unwrap();
     let data = system(&mut PointToPlane).information();
     let both = data + system(&mut PointToPoint).information();
     let check = |system: NormalEquations, data: Matrix6<f64>| {

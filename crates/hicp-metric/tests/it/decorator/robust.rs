@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
-use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, resized};
+use crate::scenes::{
+    AtStart, Numbers, advanced, center, difference, ellipsoid, exact, messy, resized,
+};
 use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3};
 use hicp_metric::Minimize;
@@ -170,9 +172,7 @@ fn contaminated(numbers: &mut Numbers, motion: &Isometry3<f64>, share: f64) -> C
 fn settle(metric: &mut dyn Minimize, pairs: &Correspondences) -> Isometry3<f64> {
     let mut increment = Isometry3::identity();
     for _ in 0..30 {
-        let step = metric
-            .minimize(&Iteration::default(), &advanced(pairs, &increment))
-            .unwrap();
+        let step = metric.step(&advanced(pairs, &increment)).unwrap();
         increment = step.increment * increment;
     }
     increment
@@ -217,16 +217,14 @@ fn without_a_kernel_it_equals_the_inner_metric() {
     for scale in [Scale::Meters(0.002), Scale::default()] {
         let mut robust = Robust::new(PointToPoint, Kernel::L2, scale);
         let (found, plain) = (
-            robust.minimize(&Iteration::default(), &pairs).unwrap(),
-            PointToPoint
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap(),
+            robust.step(&pairs).unwrap(),
+            PointToPoint.step(&pairs).unwrap(),
         );
         assert_eq!(found.increment, plain.increment);
         assert!((found.mean_loss - plain.mean_loss).abs() < 1e-14);
         assert_eq!(
-            robust.system(&Iteration::default(), &pairs),
-            PointToPoint.system(&Iteration::default(), &pairs)
+            robust.normal_equations(&pairs),
+            PointToPoint.normal_equations(&pairs)
         );
     }
 }
@@ -245,10 +243,10 @@ fn weights_depend_on_the_residual_in_units_of_the_scale() {
             ),
         ] {
             let a = Robust::new(PointToPlane, kernel, here)
-                .minimize(&Iteration::default(), &pairs)
+                .step(&pairs)
                 .unwrap();
             let b = Robust::new(PointToPlane, kernel, there)
-                .minimize(&Iteration::default(), &resized(&pairs, 1024.0))
+                .step(&resized(&pairs, 1024.0))
                 .unwrap();
             assert!((a.increment.rotation.inverse() * b.increment.rotation).angle() < 1e-7);
             assert!((b.mean_loss / a.mean_loss / 1024.0_f64.powi(2) - 1.0).abs() < 1e-12);
@@ -271,9 +269,8 @@ fn the_scale_is_the_median_of_pairs_with_weight() {
     residuals.sort_by(f64::total_cmp);
     let sigma = 1.4826 * residuals[25];
     let mad = Scale::Mad { floor_meters: 0.0 };
-    let a = Robust::new(PointToPlane, Kernel::TUKEY, mad).minimize(&Iteration::default(), &pairs);
-    let b = Robust::new(PointToPlane, Kernel::TUKEY, Scale::Meters(sigma))
-        .minimize(&Iteration::default(), &pairs);
+    let a = Robust::new(PointToPlane, Kernel::TUKEY, mad).step(&pairs);
+    let b = Robust::new(PointToPlane, Kernel::TUKEY, Scale::Meters(sigma)).step(&pairs);
     assert_eq!(a, b);
 }
 
@@ -329,17 +326,13 @@ fn the_mean_loss_falls_with_every_step_and_rises_with_drift() {
         let mut increment = Isometry3::identity();
         let mut last = f64::INFINITY;
         for _ in 0..15 {
-            let step = metric
-                .minimize(&Iteration::default(), &advanced(&pairs, &increment))
-                .unwrap();
+            let step = metric.step(&advanced(&pairs, &increment)).unwrap();
             assert!(step.mean_loss <= last * (1.0 + 1e-5), "{kernel:?}");
             last = step.mean_loss;
             increment = step.increment * increment;
         }
         let drift = Isometry3::translation(0.1, 0.0, 0.0) * increment;
-        let drifted = metric
-            .mean_loss(&Iteration::default(), &advanced(&pairs, &drift))
-            .unwrap();
+        let drifted = metric.loss(&advanced(&pairs, &drift)).unwrap();
         assert!(drifted > last, "{kernel:?}");
     }
 }
@@ -364,26 +357,16 @@ fn residuals_may_be_zero_equal_single_or_infinite() {
     for kernel in KERNELS {
         for scale in scales {
             let mut metric = Robust::new(PointToPoint, kernel, scale);
-            let step = metric.minimize(&Iteration::default(), &fitting).unwrap();
+            let step = metric.step(&fitting).unwrap();
             assert!(difference(&step.increment, &Isometry3::identity()).1 < 1e-12);
             assert_eq!(step.mean_loss.to_bits(), 0.0_f64.to_bits());
-            assert_eq!(metric.minimize(&Iteration::default(), &alone), None);
-            assert_eq!(
-                metric.minimize(&Iteration::default(), &infinite),
-                None,
-                "{kernel:?} {scale:?}"
-            );
-            assert_eq!(
-                metric.minimize(&Iteration::default(), &Correspondences::new()),
-                None
-            );
-            assert_eq!(
-                metric.mean_loss(&Iteration::default(), &Correspondences::new()),
-                None
-            );
+            assert_eq!(metric.step(&alone), None);
+            assert_eq!(metric.step(&infinite), None, "{kernel:?} {scale:?}");
+            assert_eq!(metric.step(&Correspondences::new()), None);
+            assert_eq!(metric.loss(&Correspondences::new()), None);
             // With a median, equal distances are not all outliers.
             if matches!(scale, Scale::Mad { .. }) {
-                let step = metric.minimize(&Iteration::default(), &equal).unwrap();
+                let step = metric.step(&equal).unwrap();
                 assert!(
                     difference(&step.increment, &shift).1 < 1e-6,
                     "{kernel:?} {scale:?}"

@@ -1,7 +1,6 @@
 //! Tests of iterations over fixed pairs.
 
-use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, resized};
-use hicp_core::Iteration;
+use crate::scenes::{AtStart, Numbers, advanced, center, difference, ellipsoid, exact, messy};
 use hicp_core::{Correspondences, Isometry3};
 use hicp_metric::Minimize;
 use hicp_metric::{
@@ -31,9 +30,7 @@ fn loss_after(
     pairs: &Correspondences,
     increment: &Isometry3<f64>,
 ) -> f64 {
-    metric
-        .mean_loss(&Iteration::default(), &advanced(pairs, increment))
-        .unwrap()
+    metric.loss(&advanced(pairs, increment)).unwrap()
 }
 
 #[test]
@@ -45,10 +42,8 @@ fn gauss_newton_ends_at_the_closed_form() {
         let mut iterated = GaussNewton::new(PointToPoint);
         iterated.tolerance = 0.0;
         let (a, b) = (
-            iterated.minimize(&Iteration::default(), &pairs).unwrap(),
-            PointToPoint
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap(),
+            iterated.step(&pairs).unwrap(),
+            PointToPoint.step(&pairs).unwrap(),
         );
         let (angle, distance) = difference(&a.increment, &b.increment);
         assert!(
@@ -73,7 +68,7 @@ fn exact_pairs_are_aligned() {
             marquardt.max_iterations = 60;
             let solvers: [&mut dyn Minimize; 2] = [&mut newton, &mut marquardt];
             for solver in solvers {
-                let step = solver.minimize(&Iteration::default(), &pairs).unwrap();
+                let step = solver.step(&pairs).unwrap();
                 let (angle, distance) = difference(&step.increment, &motion);
                 assert!(
                     angle < 2e-5 && distance < 2e-6,
@@ -92,29 +87,16 @@ fn one_iteration_is_one_step() {
     let mut once = GaussNewton::new(PointToPlane);
     once.max_iterations = 1;
     let (a, b) = (
-        once.minimize(&Iteration::default(), &pairs).unwrap(),
-        PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap(),
+        once.step(&pairs).unwrap(),
+        PointToPlane.step(&pairs).unwrap(),
     );
     let (angle, distance) = difference(&a.increment, &b.increment);
     assert!(angle < 1e-15 && distance < 1e-15);
     once.max_iterations = 0;
-    assert_eq!(
-        once.minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment,
-        Isometry3::identity()
-    );
+    assert_eq!(once.step(&pairs).unwrap().increment, Isometry3::identity());
     let mut never = LevenbergMarquardt::new(PointToPlane);
     never.max_iterations = 0;
-    assert_eq!(
-        never
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment,
-        Isometry3::identity()
-    );
+    assert_eq!(never.step(&pairs).unwrap().increment, Isometry3::identity());
 }
 
 #[test]
@@ -128,12 +110,12 @@ fn levenberg_marquardt_never_raises_the_loss() {
             pair.target.point += (numbers.vector() * 0.2).cast::<f32>();
         }
         for mut metric in metrics() {
-            let before = metric.mean_loss(&Iteration::default(), &pairs).unwrap();
+            let before = metric.loss(&pairs).unwrap();
             for iterations in [1, 2, 5, 40] {
                 let mut solver = LevenbergMarquardt::new(metric);
                 solver.max_iterations = iterations;
                 solver.initial_damping = 0.0;
-                let step = solver.minimize(&Iteration::default(), &pairs).unwrap();
+                let step = solver.step(&pairs).unwrap();
                 assert!((step.mean_loss - before).abs() <= 1e-15 * before);
                 metric = solver.metric;
                 let after = loss_after(&mut metric, &pairs, &step.increment);
@@ -152,40 +134,16 @@ fn plain_steps_that_raise_the_loss_are_rejected() {
     for _ in 0..40 {
         let motion = numbers.motion(&center(), 120.0, 0.05);
         let pairs = advanced(&messy(&mut numbers, 12), &motion);
-        let step = PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap();
+        let step = PointToPlane.step(&pairs).unwrap();
         if loss_after(&mut PointToPlane, &pairs, &step.increment) > step.mean_loss {
             raised += 1;
             let mut solver = LevenbergMarquardt::new(PointToPlane);
             solver.initial_damping = 0.0;
-            let careful = solver.minimize(&Iteration::default(), &pairs).unwrap();
+            let careful = solver.step(&pairs).unwrap();
             assert!(loss_after(&mut PointToPlane, &pairs, &careful.increment) < step.mean_loss);
         }
     }
     assert!(raised > 0);
-}
-
-/// A power of two keeps the roundings: the same iterations in meters and in units of 1/1024 m.
-#[test]
-fn the_unit_of_length_does_not_matter() {
-    let mut numbers = Numbers(76);
-    let pairs = messy(&mut numbers, 60);
-    let small = resized(&pairs, 1024.0);
-    let solvers: [Box<dyn Minimize>; 2] = [
-        Box::new(GaussNewton::new(PointToPlane)),
-        Box::new(LevenbergMarquardt::new(PointToPlane)),
-    ];
-    for mut solver in solvers {
-        let (a, b) = (
-            solver.minimize(&Iteration::default(), &pairs).unwrap(),
-            solver.minimize(&Iteration::default(), &small).unwrap(),
-        );
-        let turn = a.increment.rotation.inverse() * b.increment.rotation;
-        assert!(turn.angle() < 1e-7, "{}", solver.label());
-        let shift = b.increment.translation.vector / 1024.0 - a.increment.translation.vector;
-        assert!(shift.norm() < 1e-9, "{}", solver.label());
-    }
 }
 
 #[test]
@@ -198,13 +156,10 @@ fn perfect_few_and_missing_pairs() {
         Box::new(LevenbergMarquardt::new(PointToPlane)),
     ];
     for mut solver in solvers {
-        let step = solver.minimize(&Iteration::default(), &fitting).unwrap();
+        let step = solver.step(&fitting).unwrap();
         assert!(difference(&step.increment, &Isometry3::identity()).1 < 1e-12);
         assert_eq!(step.mean_loss.to_bits(), 0.0_f64.to_bits());
-        assert_eq!(solver.minimize(&Iteration::default(), &few), None);
-        assert_eq!(
-            solver.minimize(&Iteration::default(), &Correspondences::new()),
-            None
-        );
+        assert_eq!(solver.step(&few), None);
+        assert_eq!(solver.step(&Correspondences::new()), None);
     }
 }

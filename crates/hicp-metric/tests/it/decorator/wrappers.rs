@@ -3,7 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
-use crate::scenes::{Numbers, center, messy};
+use crate::scenes::{AtStart, Numbers, center, messy};
 use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair, Problem};
 use hicp_metric::Minimize;
@@ -167,14 +167,12 @@ fn errors_of_a_pair_are_those_of_the_metric() {
 fn losses_are_those_of_the_metric() {
     let mut numbers = Numbers(29);
     let pairs = messy(&mut numbers, 50);
-    let expected = PointToPlane
-        .mean_loss(&Iteration::default(), &pairs)
-        .unwrap();
+    let expected = PointToPlane.loss(&pairs).unwrap();
     assert!(expected > 0.0);
     for (name, mut wrapped) in around(&PointToPlane) {
-        let found = wrapped.mean_loss(&Iteration::default(), &pairs).unwrap();
+        let found = wrapped.loss(&pairs).unwrap();
         assert!((found - expected).abs() < 1e-12 * expected, "{name}");
-        let step = wrapped.minimize(&Iteration::default(), &pairs).unwrap();
+        let step = wrapped.step(&pairs).unwrap();
         assert!(
             (step.mean_loss - expected).abs() < 1e-12 * expected,
             "{name}"
@@ -187,11 +185,11 @@ fn losses_are_those_of_the_metric() {
 fn systems_are_those_of_the_metric() {
     let mut numbers = Numbers(30);
     let pairs = messy(&mut numbers, 50);
-    let expected = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
+    let expected = PointToPlane.normal_equations(&pairs).unwrap();
     let same = ["gauss-newton", "levenberg-marquardt", "metric-schedule"];
     let mut found = 0;
     for (name, mut wrapped) in around(&PointToPlane) {
-        let system = wrapped.system(&Iteration::default(), &pairs).unwrap();
+        let system = wrapped.normal_equations(&pairs).unwrap();
         if same.contains(&name) {
             assert_eq!(system, expected, "{name}");
             found += 1;
@@ -283,11 +281,8 @@ fn a_schedule_selects_the_metric_of_its_iteration_and_then_the_last() {
     let mut errors = vec![0.0; pairs.len()];
     empty.add_squared_errors(&first, &pairs, 1.0, &mut errors);
     assert!(errors.iter().all(|error| *error == 0.0));
-    assert_eq!(empty.mean_loss(&Iteration::default(), &pairs), None);
-    assert!(
-        empty.minimize(&Iteration::default(), &pairs).is_none()
-            && empty.system(&Iteration::default(), &pairs).is_none()
-    );
+    assert_eq!(empty.loss(&pairs), None);
+    assert!(empty.step(&pairs).is_none() && empty.normal_equations(&pairs).is_none());
 }
 
 #[test]
@@ -310,7 +305,7 @@ fn decorators_compare_by_their_options() {
     let pairs = messy(&mut Numbers(9), 40);
     fn unchanged<M: Minimize + Clone + PartialEq>(mut metric: M, pairs: &Correspondences) -> bool {
         let fresh = metric.clone();
-        metric.minimize(&Iteration::default(), pairs).unwrap();
+        metric.step(pairs).unwrap();
         metric == fresh
     }
     let robust = Robust::new(PointToPlane, Kernel::TUKEY, Scale::default());

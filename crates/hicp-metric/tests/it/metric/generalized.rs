@@ -1,8 +1,8 @@
 //! Tests of Generalized ICP and its special cases.
 
-use crate::scenes::{Numbers, center, difference, ellipsoid, exact, messy, same_information};
-use hicp_core::Iteration;
-use hicp_metric::Minimize;
+use crate::scenes::{
+    AtStart, Numbers, center, difference, ellipsoid, exact, messy, same_information,
+};
 use hicp_metric::{ErrorMetric, GaussNewton, Generalized, PointToPlane, PointToPoint};
 
 #[test]
@@ -18,8 +18,8 @@ fn epsilon_one_is_half_of_point_to_point() {
         assert!((2.0 * half - whole).abs() < 1e-12 * whole);
     }
     let (a, b) = (
-        spheres.system(&Iteration::default(), &pairs).unwrap(),
-        PointToPoint.system(&Iteration::default(), &pairs).unwrap(),
+        spheres.normal_equations(&pairs).unwrap(),
+        PointToPoint.normal_equations(&pairs).unwrap(),
     );
     assert!((a.information() * 2.0 - b.information()).amax() < 1e-12 * b.information().amax());
     let (angle, distance) = difference(&a.solve().unwrap(), &b.solve().unwrap());
@@ -33,16 +33,10 @@ fn epsilon_near_zero_is_point_to_plane_if_normals_agree() {
     for pair in pairs.as_mut_slice() {
         pair.source.normal = pair.target.normal;
     }
-    let plane = PointToPlane
-        .minimize(&Iteration::default(), &pairs)
-        .unwrap()
-        .increment;
+    let plane = PointToPlane.step(&pairs).unwrap().increment;
     let mut last = f64::INFINITY;
     for epsilon in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
-        let found = Generalized { epsilon }
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let found = Generalized { epsilon }.step(&pairs).unwrap().increment;
         let (angle, _) = difference(&found, &plane);
         assert!(angle < 0.3 * last, "{epsilon}: {angle}");
         last = angle;
@@ -75,8 +69,8 @@ fn the_orientation_of_normals_does_not_matter() {
     }
     let mut metric = Generalized::default();
     let (a, b) = (
-        metric.system(&Iteration::default(), &pairs).unwrap(),
-        metric.system(&Iteration::default(), &flipped).unwrap(),
+        metric.normal_equations(&pairs).unwrap(),
+        metric.normal_equations(&flipped).unwrap(),
     );
     assert!(same_information(&a, &b, 1e-9));
 }
@@ -89,7 +83,7 @@ fn exact_pairs_are_aligned_by_iterating() {
         let motion = numbers.motion(&center(), degrees, 0.03);
         let pairs = exact(&source, &motion);
         let step = GaussNewton::new(Generalized::default())
-            .minimize(&Iteration::default(), &pairs)
+            .step(&pairs)
             .unwrap();
         let (angle, distance) = difference(&step.increment, &motion);
         assert!(
@@ -103,7 +97,7 @@ fn exact_pairs_are_aligned_by_iterating() {
 fn any_epsilon_is_valid() {
     let mut numbers = Numbers(35);
     let pairs = messy(&mut numbers, 40);
-    let step = |epsilon| Generalized { epsilon }.minimize(&Iteration::default(), &pairs);
+    let step = |epsilon| Generalized { epsilon }.step(&pairs);
     assert_eq!(step(0.0), step(1e-6));
     assert_eq!(step(-1.0), step(1e-6));
     assert_eq!(step(7.0), step(1.0));

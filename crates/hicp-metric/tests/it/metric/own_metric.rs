@@ -1,6 +1,6 @@
 //! Tests of the provided methods of a custom metric.
 
-use crate::scenes::{Numbers, ellipsoid, exact, messy, same_information};
+use crate::scenes::{AtStart, Numbers, ellipsoid, exact, messy, same_information};
 use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Pair, Vector3};
 use hicp_metric::Minimize;
@@ -74,21 +74,10 @@ fn the_default_name_is_that_of_the_type() {
 fn points_that_are_not_finite_give_no_system() {
     let mut numbers = Numbers(402);
     let mut pairs = messy(&mut numbers, 30);
-    assert!(
-        DepthDifference
-            .system(&Iteration::default(), &pairs)
-            .is_some()
-    );
+    assert!(DepthDifference.normal_equations(&pairs).is_some());
     pairs.as_mut_slice()[7].source.point.x = f32::INFINITY;
-    assert!(
-        DepthDifference
-            .system(&Iteration::default(), &pairs)
-            .is_none()
-    );
-    assert_eq!(
-        DepthDifference.minimize(&Iteration::default(), &pairs),
-        None
-    );
+    assert!(DepthDifference.normal_equations(&pairs).is_none());
+    assert_eq!(DepthDifference.step(&pairs), None);
 }
 
 /// The pivot is the centroid of the points at which the rows act, and the length their RMS radius.
@@ -119,7 +108,7 @@ fn systems_are_centered_and_scaled() {
         (Box::new(PlaneToPoint), target),
     ];
     for (mut metric, of) in metrics {
-        let system = metric.system(&Iteration::default(), &pairs).unwrap();
+        let system = metric.normal_equations(&pairs).unwrap();
         let (centroid, radius) = expected(of);
         assert!(
             (system.pivot().coords - centroid).norm() < 1e-14,
@@ -137,13 +126,7 @@ fn systems_are_centered_and_scaled() {
         &vec![ellipsoid(&mut numbers, 1)[0]; 9],
         &Isometry3::identity(),
     );
-    assert_eq!(
-        PointToPoint
-            .system(&Iteration::default(), &one)
-            .unwrap()
-            .length(),
-        1.0
-    );
+    assert_eq!(PointToPoint.normal_equations(&one).unwrap().length(), 1.0);
 }
 
 /// A pair without weight costs no digits, at any distance and at any position in the list.
@@ -167,8 +150,8 @@ fn pairs_without_weight_do_not_matter_anywhere() {
     ];
     for mut metric in metrics {
         let (a, b) = (
-            metric.system(&Iteration::default(), &pairs).unwrap(),
-            metric.system(&Iteration::default(), &with).unwrap(),
+            metric.normal_equations(&pairs).unwrap(),
+            metric.normal_equations(&with).unwrap(),
         );
         assert!(
             (a.length() - b.length()).abs() < 1e-14,
@@ -177,10 +160,7 @@ fn pairs_without_weight_do_not_matter_anywhere() {
         );
         assert!((a.pivot() - b.pivot()).norm() < 1e-14, "{}", metric.label());
         assert!(same_information(&a, &b, 1e-13), "{}", metric.label());
-        let (a, b) = (
-            metric.minimize(&Iteration::default(), &pairs).unwrap(),
-            metric.minimize(&Iteration::default(), &with).unwrap(),
-        );
+        let (a, b) = (metric.step(&pairs).unwrap(), metric.step(&with).unwrap());
         let (angle, distance) = crate::scenes::difference(&a.increment, &b.increment);
         assert!(
             angle < 1e-10 && distance < 1e-11,
@@ -209,14 +189,8 @@ fn a_term_of_factor_zero_is_skipped() {
     let mut sum = WeightedSum {
         terms: ((1.0, PointToPlane), (0.0, Never)),
     };
-    assert_eq!(
-        sum.minimize(&Iteration::default(), &pairs),
-        PointToPlane.minimize(&Iteration::default(), &pairs)
-    );
-    assert_eq!(
-        sum.mean_loss(&Iteration::default(), &pairs),
-        PointToPlane.mean_loss(&Iteration::default(), &pairs)
-    );
+    assert_eq!(sum.step(&pairs), PointToPlane.step(&pairs));
+    assert_eq!(sum.loss(&pairs), PointToPlane.loss(&pairs));
     let squared_errors = |metric: &mut dyn Minimize| {
         let mut errors = vec![0.0; pairs.len()];
         metric.add_squared_errors(&Iteration::default(), &pairs, 1.0, &mut errors);
@@ -224,7 +198,7 @@ fn a_term_of_factor_zero_is_skipped() {
     };
     assert_eq!(squared_errors(&mut sum), squared_errors(&mut PointToPlane));
     let information = |metric: &mut dyn Minimize| {
-        let system = metric.system(&Iteration::default(), &pairs);
+        let system = metric.normal_equations(&pairs);
         system.map(|system| system.information())
     };
     assert_eq!(information(&mut sum), information(&mut PointToPlane));

@@ -2,9 +2,8 @@
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{ellipsoid, moved, pair, small_motion};
-use hicp_core::Iteration;
+use crate::scenes::AtStart;
 use hicp_core::{Correspondences, Matrix6, Pair, Point3, Vector3, Vector6, se3, so3};
-use hicp_metric::Minimize;
 use hicp_metric::PointToPlane;
 
 /// Returns n · (exp(ξ) p − q) by its definition.
@@ -43,9 +42,7 @@ fn the_step_is_that_of_gauss_newton_for_the_defined_residual() {
             weight += w;
         }
         let expected = se3::exp(&-(hessian.try_inverse().unwrap() * gradient));
-        let step = PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap();
+        let step = PointToPlane.step(&pairs).unwrap();
         let (angle, distance) = se3::pose_distance(&step.increment, &expected);
         // Damping with 1e-6 of the mean diagonal shortens a step by up to 1e-6 · mean/smallest
         // eigenvalue, about 2e-5 here, of 0.1 rad and 3 cm.
@@ -63,13 +60,7 @@ fn pitfall_2_the_residual_is_a_projection_not_an_elementwise_product() {
     let pairs: Correspondences = points
         .map(|p| pair(p, p + Vector3::new(0.5, -0.5, 7.0), normal, 1.0))
         .collect();
-    assert!(
-        PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .mean_loss
-            < 1e-12
-    );
+    assert!(PointToPlane.step(&pairs).unwrap().mean_loss < 1e-12);
 }
 
 #[test]
@@ -80,12 +71,8 @@ fn pitfall_2_loss_and_step_do_not_depend_on_the_frame() {
         let pairs = ellipsoid(&mut numbers, 80, &off, &Vector3::zeros());
         let frame = numbers.pose(0.5);
         let (here, there) = (
-            PointToPlane
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap(),
-            PointToPlane
-                .minimize(&Iteration::default(), &moved(&pairs, &frame))
-                .unwrap(),
+            PointToPlane.step(&pairs).unwrap(),
+            PointToPlane.step(&moved(&pairs, &frame)).unwrap(),
         );
         // Points of up to 2 m round by 1e-7 m, and so do residuals of 5 mm. Levers are 4 cm.
         assert!((here.mean_loss - there.mean_loss).abs() < 4e-5 * here.mean_loss);
@@ -115,10 +102,7 @@ fn pitfall_12_a_plane_moves_only_along_its_normal() {
                 pair(p, p + normal * 0.05, normal, 1.0)
             })
             .collect();
-        let increment = PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let increment = PointToPlane.step(&pairs).unwrap().increment;
         let center = frame * Point3::origin();
         let shift = increment * center - center;
         // The roundings of the points (1e-7 m) make the residuals uneven over levers of 1 m.
@@ -150,10 +134,7 @@ fn pitfall_12_a_sphere_does_not_rotate_and_a_cylinder_neither_slides_nor_spins()
                 pair(q + shift, q, frame.rotation * n, 1.0)
             })
             .collect();
-        let increment = PointToPlane
-            .minimize(&Iteration::default(), &sphere)
-            .unwrap()
-            .increment;
+        let increment = PointToPlane.step(&sphere).unwrap().increment;
         let center = Point3::from(frame.translation.vector) + shift;
         assert!((increment * center - center + shift).norm() < 1e-6);
         // Rounded normals act on the free rotation with up to 1e-7 of the residuals (1 mm RMS),
@@ -182,10 +163,7 @@ fn pitfall_12_a_sphere_does_not_rotate_and_a_cylinder_neither_slides_nor_spins()
                 pair(q + shift, q, frame.rotation * n, 1.0)
             })
             .collect();
-        let increment = PointToPlane
-            .minimize(&Iteration::default(), &cylinder)
-            .unwrap()
-            .increment;
+        let increment = PointToPlane.step(&cylinder).unwrap().increment;
         let center = Point3::from(frame.translation.vector) + shift;
         let step = increment * center - center;
         let across = shift - axis * shift.dot(&axis);

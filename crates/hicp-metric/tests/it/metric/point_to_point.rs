@@ -2,9 +2,8 @@
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, loss, pair, rms, rounding};
-use hicp_core::Iteration;
+use crate::scenes::AtStart;
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, Vector6, se3};
-use hicp_metric::Minimize;
 use hicp_metric::{ErrorMetric, NormalEquations, PointToPoint};
 
 /// The provided Gauss–Newton step with the rows of point-to-point.
@@ -55,9 +54,7 @@ fn exact_pairs_are_aligned_in_one_step_up_to_rounding() {
                     .map(|p| turn * p)
                     .collect();
                 let pairs = images(&points, &motion);
-                let step = PointToPoint
-                    .minimize(&Iteration::default(), &pairs)
-                    .unwrap();
+                let step = PointToPoint.step(&pairs).unwrap();
                 // The true motion leaves the roundings of both points. The best motion cannot leave
                 // more.
                 let bound = 2.0 * rounding(&pairs);
@@ -84,8 +81,8 @@ fn the_system_equals_that_of_its_rows() {
             pair.weight = [1.0, 0.25, 3.0, 0.0][index % 4];
         }
         let (found, expected) = (
-            PointToPoint.system(&Iteration::default(), &pairs),
-            Iterative.system(&Iteration::default(), &pairs),
+            PointToPoint.normal_equations(&pairs),
+            Iterative.normal_equations(&pairs),
         );
         let (found, expected) = (found.unwrap(), expected.unwrap());
         assert_eq!(found.rows(), expected.rows());
@@ -110,10 +107,7 @@ fn random_motions_are_recovered() {
         let motion = numbers.pose(0.3);
         let points = cloud(&mut numbers, 200, [0.05, 0.05, 0.05]);
         let pairs = images(&points, &motion);
-        let found = PointToPoint
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let found = PointToPoint.step(&pairs).unwrap().increment;
         let (angle, _) = se3::pose_distance(&found, &motion);
         // Points are 5 cm from the centroid and off by one rounding each: at most rounding / 5 cm
         // in the worst case.
@@ -146,10 +140,7 @@ fn pitfall_12_collinear_points_are_mapped_onto_their_targets_by_the_smallest_rot
                 .map(|i| Point3::from(line * (0.02 * f64::from(i))))
                 .collect();
             let pairs = images(&points, &motion);
-            let found = PointToPoint
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap()
-                .increment;
+            let found = PointToPoint.step(&pairs).unwrap().increment;
             assert!(rms(&pairs, &found) <= 2.0 * rounding(&pairs), "{angle}");
             assert!((determinant(&found) - 1.0).abs() < 1e-14);
             let (turned, _) = se3::pose_distance(&found, &Isometry3::identity());
@@ -170,10 +161,7 @@ fn pitfall_18_planar_points_and_noise_never_give_a_reflection() {
             let points = cloud(&mut numbers, 6, [0.05, 0.05, 0.0]);
             let mut pairs = images(&points, &numbers.pose(0.3));
             noisy(&mut numbers, &mut pairs, sigma);
-            let found = PointToPoint
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap()
-                .increment;
+            let found = PointToPoint.step(&pairs).unwrap().increment;
             assert!((determinant(&found) - 1.0).abs() < 1e-14);
         }
     }
@@ -189,10 +177,7 @@ fn a_mirror_image_gives_the_best_rotation() {
             .iter()
             .map(|p| pair(*p, turn * Point3::new(p.x, p.y, -p.z), Vector3::z(), 1.0))
             .collect();
-        let found = PointToPoint
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let found = PointToPoint.step(&pairs).unwrap().increment;
         assert!((determinant(&found) - 1.0).abs() < 1e-14);
         assert_no_better_neighbor(&mut numbers, &pairs, &found, 0.02);
     }
@@ -247,10 +232,7 @@ fn no_perturbation_lowers_the_loss() {
                 for pair in pairs.as_mut_slice() {
                     pair.weight = numbers.between(0.1, 2.0) as f32;
                 }
-                let found = PointToPoint
-                    .minimize(&Iteration::default(), &pairs)
-                    .unwrap()
-                    .increment;
+                let found = PointToPoint.step(&pairs).unwrap().increment;
                 assert_no_better_neighbor(&mut numbers, &pairs, &found, 0.05);
             }
         }
@@ -278,10 +260,7 @@ fn thin_rods_determine_their_rotation() {
                 .iter()
                 .map(|p| pair(*p, Point3::new(p.x, -p.z, p.y), Vector3::z(), 1.0))
                 .collect();
-            let found = PointToPoint
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap()
-                .increment;
+            let found = PointToPoint.step(&pairs).unwrap().increment;
             let (angle, _) = se3::pose_distance(
                 &found,
                 &Isometry3::rotation(Vector3::x() * std::f64::consts::FRAC_PI_2),
@@ -302,17 +281,10 @@ fn the_closed_form_is_the_fixed_point_of_gauss_newton() {
         let turn = numbers.direction() * 0.4;
         let mut pairs = images(&points, &Isometry3::new(numbers.vector() * 0.1, turn));
         noisy(&mut numbers, &mut pairs, 0.003);
-        let closed = PointToPoint
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let closed = PointToPoint.step(&pairs).unwrap().increment;
         let mut walked = Isometry3::identity();
         for _ in 0..30 {
-            walked = Iterative
-                .minimize(&Iteration::default(), &moved(&pairs, &walked))
-                .unwrap()
-                .increment
-                * walked;
+            walked = Iterative.step(&moved(&pairs, &walked)).unwrap().increment * walked;
         }
         let (angle, _) = se3::pose_distance(&closed, &walked);
         // Every step rounds the moved points to f32.

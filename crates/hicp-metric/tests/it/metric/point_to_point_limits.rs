@@ -2,9 +2,8 @@
 
 use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, pair, rms, rounding};
-use hicp_core::Iteration;
+use crate::scenes::AtStart;
 use hicp_core::{Correspondences, Isometry3, Point3, Vector3, se3};
-use hicp_metric::Minimize;
 use hicp_metric::{PointToPoint, Step};
 
 fn cloud(numbers: &mut Numbers, count: usize) -> Vec<Point3<f64>> {
@@ -24,35 +23,23 @@ fn too_few_pairs_and_no_weight_determine_nothing() {
     let pairs = images(&cloud(&mut numbers, 10), &numbers.pose(0.2));
     let first = |n: usize| -> Correspondences { pairs.as_slice()[..n].iter().copied().collect() };
     for n in 0..3 {
-        assert_eq!(
-            PointToPoint.minimize(&Iteration::default(), &first(n)),
-            None,
-            "{n} pairs"
-        );
+        assert_eq!(PointToPoint.step(&first(n)), None, "{n} pairs");
     }
-    assert!(
-        PointToPoint
-            .minimize(&Iteration::default(), &first(3))
-            .is_some()
-    );
+    assert!(PointToPoint.step(&first(3)).is_some());
     for weight in [0.0, f32::NAN, -1.0] {
         let mut pairs = pairs.clone();
         pairs
             .as_mut_slice()
             .iter_mut()
             .for_each(|p| p.weight = weight);
-        assert_eq!(
-            PointToPoint.minimize(&Iteration::default(), &pairs),
-            None,
-            "weight {weight}"
-        );
+        assert_eq!(PointToPoint.step(&pairs), None, "weight {weight}");
     }
     // Pairs of weight zero do not count.
     let mut two = first(8);
     two.as_mut_slice()[2..]
         .iter_mut()
         .for_each(|p| p.weight = 0.0);
-    assert_eq!(PointToPoint.minimize(&Iteration::default(), &two), None);
+    assert_eq!(PointToPoint.step(&two), None);
 }
 
 #[test]
@@ -75,7 +62,7 @@ fn points_at_one_place_determine_no_rotation() {
             .map(|_| pair(here, there, Vector3::z(), 0.3))
             .collect();
         for mut pairs in [sources, targets, both] {
-            assert_eq!(PointToPoint.minimize(&Iteration::default(), &pairs), None);
+            assert_eq!(PointToPoint.step(&pairs), None);
             // A pair without weight elsewhere changes nothing, at any position in the list.
             let outsider = pair(
                 spread(&mut numbers),
@@ -86,9 +73,9 @@ fn points_at_one_place_determine_no_rotation() {
             let with: Correspondences = std::iter::once(outsider)
                 .chain(pairs.as_slice().iter().copied())
                 .collect();
-            assert_eq!(PointToPoint.minimize(&Iteration::default(), &with), None);
+            assert_eq!(PointToPoint.step(&with), None);
             pairs.push(outsider);
-            assert_eq!(PointToPoint.minimize(&Iteration::default(), &pairs), None);
+            assert_eq!(PointToPoint.step(&pairs), None);
         }
     }
 }
@@ -107,7 +94,7 @@ fn pitfall_18_ambiguous_reflections_are_refused() {
             .collect();
         // Roundings of f32 (6e-8) may break the tie. The result is a rotation then; exact ties are
         // refused.
-        if let Some(step) = PointToPoint.minimize(&Iteration::default(), &pairs) {
+        if let Some(step) = PointToPoint.step(&pairs) {
             assert!((determinant(&step.increment) - 1.0).abs() < 1e-14);
         }
         let exact: Correspondences = axes
@@ -115,7 +102,7 @@ fn pitfall_18_ambiguous_reflections_are_refused() {
             .flat_map(|a| [*a, -*a])
             .map(|p| pair(Point3::from(p), Point3::from(-p), Vector3::z(), 1.0))
             .collect();
-        assert_eq!(PointToPoint.minimize(&Iteration::default(), &exact), None);
+        assert_eq!(PointToPoint.step(&exact), None);
     }
 }
 
@@ -156,8 +143,8 @@ fn pitfall_20_an_offset_of_a_kilometer_costs_only_the_digits_of_the_points() {
             })
             .collect();
         let (a, b) = (
-            PointToPoint.minimize(&Iteration::default(), &near).unwrap(),
-            PointToPoint.minimize(&Iteration::default(), &far).unwrap(),
+            PointToPoint.step(&near).unwrap(),
+            PointToPoint.step(&far).unwrap(),
         );
         let angle = se3::pose_distance(&a.increment, &b.increment).0;
         assert!(angle < 1e-14, "{angle}");
@@ -189,7 +176,7 @@ fn no_input_gives_nan() {
                 )
             })
             .collect();
-        if let Some(step) = PointToPoint.minimize(&Iteration::default(), &pairs) {
+        if let Some(step) = PointToPoint.step(&pairs) {
             steps += 1;
             assert!(se3::is_finite(&step.increment) && step.mean_loss.is_finite());
             assert!((determinant(&step.increment) - 1.0).abs() < 1e-14);
@@ -204,7 +191,7 @@ fn no_input_gives_nan() {
             Vector3::z(),
             1.0,
         ));
-        assert_eq!(PointToPoint.minimize(&Iteration::default(), &pairs), None);
+        assert_eq!(PointToPoint.step(&pairs), None);
     }
 }
 
@@ -224,10 +211,7 @@ fn pitfall_18_tiny_weights_have_a_tiny_influence() {
             1e-30,
         ));
     }
-    let found = PointToPoint
-        .minimize(&Iteration::default(), &pairs)
-        .unwrap()
-        .increment;
+    let found = PointToPoint.step(&pairs).unwrap().increment;
     let inliers: Correspondences = pairs.as_slice()[..30].iter().copied().collect();
     assert!(rms(&inliers, &found) <= bound);
 }
@@ -246,9 +230,7 @@ fn the_rotation_does_not_depend_on_the_unit_of_length() {
             .iter()
             .map(|[p, q]| pair((p * unit).into(), (q * unit).into(), Vector3::z(), 1.0))
             .collect();
-        PointToPoint
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
+        PointToPoint.step(&pairs).unwrap()
     };
     let expected = step(1.0);
     for power in [-149, -100, 100, 115] {
@@ -275,10 +257,7 @@ fn pitfall_12_a_line_is_mapped_onto_a_nearly_opposite_one() {
             .map(|at| pair((from * at).into(), (to * at).into(), Vector3::z(), 1.0))
             .into_iter()
             .collect();
-        let found = PointToPoint
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let found = PointToPoint.step(&pairs).unwrap().increment;
         let arrived = found.rotation * from.normalize() - to.normalize();
         assert!(arrived.norm() < 1e-12, "{off:?}: {}", arrived.norm());
     }

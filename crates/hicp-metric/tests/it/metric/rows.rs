@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::scenes::{
-    Numbers, carried, center, check_rows, difference, messy, resized, same_information,
+    AtStart, Numbers, carried, center, check_rows, difference, messy, same_information,
 };
 use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Matrix3, Pair, Point3, Vector3, se3};
@@ -132,8 +132,8 @@ fn a_common_rigid_motion_only_transforms_the_step() {
         let motion = numbers.motion(&center(), 70.0, 0.2);
         let moved = carried(&pairs, &motion);
         for mut metric in metrics() {
-            let here = metric.minimize(&Iteration::default(), &pairs).unwrap();
-            let there = metric.minimize(&Iteration::default(), &moved).unwrap();
+            let here = metric.step(&pairs).unwrap();
+            let there = metric.step(&moved).unwrap();
             let expected = motion * here.increment * motion.inverse();
             let (angle, _) = se3::pose_distance(&there.increment, &expected);
             // Points at about 0.8 m are rounded to f32: 5e-8 m at 5 cm. The weights of GICP amplify
@@ -146,32 +146,14 @@ fn a_common_rigid_motion_only_transforms_the_step() {
 }
 
 #[test]
-fn the_unit_of_length_does_not_matter() {
-    let mut numbers = Numbers(14);
-    let pairs = messy(&mut numbers, 60);
-    // A power of two, which keeps the roundings.
-    let millis = resized(&pairs, 1024.0);
-    for mut metric in metrics() {
-        let meters = metric.minimize(&Iteration::default(), &pairs).unwrap();
-        let millis = metric.minimize(&Iteration::default(), &millis).unwrap();
-        let (angle, _) = se3::pose_distance(&meters.increment, &millis.increment);
-        assert!(angle < 1e-12, "{}: {angle}", metric.label());
-        let shift = millis.increment.translation.vector / 1024.0;
-        assert!((shift - meters.increment.translation.vector).norm() < 1e-12);
-        let ratio = millis.mean_loss / meters.mean_loss / 1024.0_f64.powi(2);
-        assert!((ratio - 1.0).abs() < 1e-12);
-    }
-}
-
-#[test]
 fn mean_loss_minimize_and_system_agree() {
     let mut numbers = Numbers(15);
     let pairs = messy(&mut numbers, 60);
     let weight: f64 = pairs.as_slice().iter().map(|p| f64::from(p.weight)).sum();
     for mut metric in metrics() {
-        let step = metric.minimize(&Iteration::default(), &pairs).unwrap();
-        let mean = metric.mean_loss(&Iteration::default(), &pairs).unwrap();
-        let system = metric.system(&Iteration::default(), &pairs).unwrap();
+        let step = metric.step(&pairs).unwrap();
+        let mean = metric.loss(&pairs).unwrap();
+        let system = metric.normal_equations(&pairs).unwrap();
         let mut errors = vec![0.0; pairs.len()];
         metric.add_squared_errors(&Iteration::default(), &pairs, 1.0, &mut errors);
         let by_pair: f64 = pairs
@@ -196,17 +178,11 @@ fn the_loss_is_a_mean_and_does_not_depend_on_the_number_of_pairs() {
     thrice.extend(pairs.as_slice().iter().copied());
     for mut metric in metrics() {
         let (once, more) = (
-            metric
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap()
-                .mean_loss,
-            metric
-                .minimize(&Iteration::default(), &thrice)
-                .unwrap()
-                .mean_loss,
+            metric.step(&pairs).unwrap().mean_loss,
+            metric.step(&thrice).unwrap().mean_loss,
         );
         assert!((once - more).abs() < 1e-12 * once, "{}", metric.label());
-        let more = metric.mean_loss(&Iteration::default(), &thrice).unwrap();
+        let more = metric.loss(&thrice).unwrap();
         assert!((once - more).abs() < 1e-12 * once, "{}", metric.label());
     }
 }
@@ -231,7 +207,7 @@ fn few_and_coincident_pairs_give_finite_steps_or_none() {
     ];
     for mut metric in metrics() {
         for (i, pairs) in sets.iter().enumerate() {
-            let step = metric.minimize(&Iteration::default(), pairs);
+            let step = metric.step(pairs);
             if let Some(step) = step {
                 assert!(se3::is_finite(&step.increment) && step.mean_loss.is_finite());
                 assert!(difference(&step.increment, &Isometry3::identity()).1 < 0.1);
@@ -281,20 +257,9 @@ fn inputs_that_are_not_finite_have_no_loss() {
     for metric in &mut all {
         for (i, pairs) in wrong.iter().enumerate() {
             let name = metric.label();
-            assert_eq!(
-                metric.mean_loss(&Iteration::default(), pairs),
-                None,
-                "{name} {i}"
-            );
-            assert_eq!(
-                metric.minimize(&Iteration::default(), pairs),
-                None,
-                "{name} {i}"
-            );
-            assert!(
-                metric.system(&Iteration::default(), pairs).is_none(),
-                "{name} {i}"
-            );
+            assert_eq!(metric.loss(pairs), None, "{name} {i}");
+            assert_eq!(metric.step(pairs), None, "{name} {i}");
+            assert!(metric.normal_equations(pairs).is_none(), "{name} {i}");
         }
     }
 }
@@ -311,9 +276,9 @@ fn a_sum_is_the_sum_of_its_systems() {
             (0.0, PointToPoint),
         ),
     };
-    let whole = sum.system(&Iteration::default(), &pairs).unwrap();
-    let plane = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
-    let symmetric = Symmetric.system(&Iteration::default(), &pairs).unwrap();
+    let whole = sum.normal_equations(&pairs).unwrap();
+    let plane = PointToPlane.normal_equations(&pairs).unwrap();
+    let symmetric = Symmetric.normal_equations(&pairs).unwrap();
     let expected = plane.information() * 0.7 + symmetric.information() * 0.3;
     assert!((whole.information() - expected).amax() < 1e-12 * expected.amax());
     assert_eq!(whole.rows(), plane.rows() + symmetric.rows());
@@ -322,14 +287,8 @@ fn a_sum_is_the_sum_of_its_systems() {
         terms: ((1.0, PointToPlane),),
     };
     assert_eq!(
-        alone
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment,
-        PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment
+        alone.step(&pairs).unwrap().increment,
+        PointToPlane.step(&pairs).unwrap().increment
     );
     // Systems with other pivots and lengths merge into the same information.
     let mut elsewhere = hicp_metric::NormalEquations::new(Point3::new(1.0, 2.0, -1.0), 0.7);
@@ -352,7 +311,7 @@ fn a_little_point_to_point_keeps_a_plane_from_sliding() {
     let mut sum = WeightedSum {
         terms: ((1.0, PointToPlane), (0.1, PointToPoint)),
     };
-    let step = sum.minimize(&Iteration::default(), &pairs).unwrap();
+    let step = sum.step(&pairs).unwrap();
     let (angle, distance) = difference(&step.increment, &motion);
     assert!(angle < 1e-6 && distance < 1e-6, "{angle} {distance}");
 }

@@ -1,9 +1,9 @@
 //! Tests of the symmetric metric: exact in one step, with skipped pairs.
 
-use crate::scenes::{Numbers, advanced, center, difference, ellipsoid, exact, messy, surfel};
-use hicp_core::Iteration;
+use crate::scenes::{
+    AtStart, Numbers, advanced, center, difference, ellipsoid, exact, messy, surfel,
+};
 use hicp_core::{Correspondences, Isometry3, Matrix6, Pair, Vector3, Vector6, so3};
-use hicp_metric::Minimize;
 use hicp_metric::{ErrorMetric, NO_ROWS, PointToPlane, Symmetric};
 
 #[test]
@@ -14,7 +14,7 @@ fn exact_pairs_are_aligned_in_one_step() {
             let source = ellipsoid(&mut numbers, 300);
             let motion = numbers.motion(&center(), degrees, 0.05);
             let pairs = exact(&source, &motion);
-            let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
+            let step = Symmetric.step(&pairs).unwrap();
             let (angle, distance) = difference(&step.increment, &motion);
             // Points are rounded to f32 at 0.6 m: 3e-8 m against 5 cm.
             assert!(
@@ -26,9 +26,7 @@ fn exact_pairs_are_aligned_in_one_step() {
     // Point-to-plane is not exact, which is the difference to this metric.
     let source = ellipsoid(&mut numbers, 300);
     let motion = numbers.motion(&center(), 30.0, 0.0);
-    let linear = PointToPlane
-        .minimize(&Iteration::default(), &exact(&source, &motion))
-        .unwrap();
+    let linear = PointToPlane.step(&exact(&source, &motion)).unwrap();
     assert!(difference(&linear.increment, &motion).0 > 0.01);
 }
 
@@ -39,10 +37,10 @@ fn weights_count_and_the_minimum_is_that_of_its_rows() {
     // Repeated steps converge to a zero gradient of the linearized rows, up to terms of the
     // residuals.
     for _ in 0..30 {
-        let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
+        let step = Symmetric.step(&pairs).unwrap();
         pairs = advanced(&pairs, &step.increment);
     }
-    let system = Symmetric.system(&Iteration::default(), &pairs).unwrap();
+    let system = Symmetric.normal_equations(&pairs).unwrap();
     let rest = system.solve().unwrap();
     let (angle, distance) = difference(&rest, &Isometry3::identity());
     assert!(angle < 5e-3 && distance < 3e-4, "{angle} {distance}");
@@ -53,8 +51,8 @@ fn weights_count_and_the_minimum_is_that_of_its_rows() {
         pair.weight = 0.0;
     }
     let (a, b) = (
-        Symmetric.minimize(&Iteration::default(), &with).unwrap(),
-        Symmetric.minimize(&Iteration::default(), &without).unwrap(),
+        Symmetric.step(&with).unwrap(),
+        Symmetric.step(&without).unwrap(),
     );
     assert!((a.mean_loss - b.mean_loss).abs() < 1e-15);
     assert!(difference(&a.increment, &b.increment).0 < 1e-12);
@@ -74,20 +72,14 @@ fn pairs_of_different_sides_are_skipped() {
         assert_eq!(Symmetric.squared_error(&wrong).to_bits(), NO_ROWS.to_bits());
         more.push(wrong);
     }
-    assert_eq!(
-        Symmetric.minimize(&Iteration::default(), &more),
-        Symmetric.minimize(&Iteration::default(), &pairs)
-    );
-    assert_eq!(
-        Symmetric.mean_loss(&Iteration::default(), &more),
-        Symmetric.mean_loss(&Iteration::default(), &pairs)
-    );
+    assert_eq!(Symmetric.step(&more), Symmetric.step(&pairs));
+    assert_eq!(Symmetric.loss(&more), Symmetric.loss(&pairs));
     // Perpendicular ones are skipped, too. If nothing else is left, there is no step.
     let source = surfel(center(), Vector3::x());
     let across = Pair::new(0, source, 0, surfel(center(), Vector3::y()));
     let only: Correspondences = [across; 20].into_iter().collect();
-    assert_eq!(Symmetric.minimize(&Iteration::default(), &only), None);
-    assert_eq!(Symmetric.mean_loss(&Iteration::default(), &only), None);
+    assert_eq!(Symmetric.step(&only), None);
+    assert_eq!(Symmetric.loss(&only), None);
 }
 
 #[test]
@@ -101,7 +93,7 @@ fn a_plane_approaches_without_sliding() {
         .collect();
     // The counterparts are elsewhere on the plane: point pairs would slide by 4 cm.
     let pairs = exact(&source, &Isometry3::translation(0.04, 0.0, 0.005));
-    let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
+    let step = Symmetric.step(&pairs).unwrap();
     let expected = Isometry3::translation(0.0, 0.0, 0.005);
     let (angle, distance) = difference(&step.increment, &expected);
     assert!(angle < 1e-6 && distance < 1e-7, "{angle} {distance}");
@@ -162,10 +154,7 @@ fn the_step_is_the_documented_one_also_for_wrong_pairs() {
             .filter(|pair| pair.source.normal.dot(&pair.target.normal) > 0.0)
             .copied()
             .collect();
-        let found = Symmetric
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let found = Symmetric.step(&pairs).unwrap().increment;
         let (angle, distance) = difference(&found, &by_formula(&counting));
         assert!(
             angle < 1e-9 && distance < 1e-10,
@@ -198,7 +187,7 @@ fn a_weak_direction_is_not_an_undetermined_one() {
         for (pair, weight) in pairs.as_mut_slice().iter_mut().zip(&weights) {
             pair.weight = *weight;
         }
-        let step = Symmetric.minimize(&Iteration::default(), &pairs).unwrap();
+        let step = Symmetric.step(&pairs).unwrap();
         let (angle, distance) = difference(&step.increment, &motion);
         assert!(
             angle < 1e-5 && distance < 1e-6,
@@ -211,26 +200,18 @@ fn a_weak_direction_is_not_an_undetermined_one() {
 fn fitting_pairs_do_not_move_and_fewer_than_six_give_no_step() {
     let mut numbers = Numbers(27);
     let fitting = exact(&ellipsoid(&mut numbers, 50), &Isometry3::identity());
-    let step = Symmetric.minimize(&Iteration::default(), &fitting).unwrap();
+    let step = Symmetric.step(&fitting).unwrap();
     assert_eq!(step.mean_loss, 0.0);
     assert_eq!(difference(&step.increment, &Isometry3::identity()).0, 0.0);
     let pairs = messy(&mut numbers, 7);
     let first = |n: usize| -> Correspondences { pairs.as_slice()[..n].iter().copied().collect() };
     for n in 0..6 {
-        assert_eq!(
-            Symmetric.minimize(&Iteration::default(), &first(n)),
-            None,
-            "{n}"
-        );
+        assert_eq!(Symmetric.step(&first(n)), None, "{n}");
     }
-    assert!(
-        Symmetric
-            .minimize(&Iteration::default(), &first(6))
-            .is_some()
-    );
+    assert!(Symmetric.step(&first(6)).is_some());
     // A pair without weight, or seen from the other side, does not count.
     let mut five = pairs.clone();
     five.as_mut_slice()[1].weight = 0.0;
     five.as_mut_slice()[4].target.normal = -five.as_slice()[4].source.normal;
-    assert_eq!(Symmetric.minimize(&Iteration::default(), &five), None);
+    assert_eq!(Symmetric.step(&five), None);
 }

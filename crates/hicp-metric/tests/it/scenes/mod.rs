@@ -3,9 +3,26 @@
 use std::f64::consts::PI;
 
 use hicp_core::{
-    Correspondences, Isometry3, Pair, Point3, Surfel, UnitVector3, Vector3, Vector6, se3,
+    Correspondences, Isometry3, Iteration, Pair, Point3, Surfel, UnitVector3, Vector3, Vector6, se3,
 };
-use hicp_metric::{ErrorMetric, NormalEquations};
+use hicp_metric::{ErrorMetric, Minimize, NormalEquations, Step};
+
+/// Evaluates a metric in the first iteration of a run.
+pub trait AtStart: Minimize {
+    fn step(&mut self, pairs: &Correspondences) -> Option<Step> {
+        self.minimize(&Iteration::default(), pairs)
+    }
+
+    fn loss(&mut self, pairs: &Correspondences) -> Option<f64> {
+        self.mean_loss(&Iteration::default(), pairs)
+    }
+
+    fn normal_equations(&mut self, pairs: &Correspondences) -> Option<NormalEquations> {
+        self.system(&Iteration::default(), pairs)
+    }
+}
+
+impl<M: Minimize + ?Sized> AtStart for M {}
 
 /// A seeded generator (SplitMix64) with the same numbers on every platform.
 #[derive(Clone, Debug)]
@@ -154,6 +171,13 @@ pub fn at(pose: &Isometry3<f64>, pairs: &Correspondences) -> Correspondences {
     posed.begin(pose, pairs.n_candidates());
     posed.extend(pairs.as_slice().iter().copied());
     posed
+}
+
+/// Returns messy pairs at a pose whose rotation is not the identity.
+pub fn posed(numbers: &mut Numbers, count: usize) -> Correspondences {
+    let pose =
+        Isometry3::translation(0.02, -0.03, 0.58) * numbers.motion(&Point3::origin(), 80.0, 0.0);
+    at(&pose, &messy(numbers, count))
 }
 
 /// Returns the rotation (radians) and the displacement of the scene's center (meters) between

@@ -1,7 +1,6 @@
 //! Tests of covariance and information: against Monte Carlo, and under changes of frame.
 
-use crate::scenes::{Numbers, carried, center, ellipsoid, exact, messy};
-use hicp_core::Iteration;
+use crate::scenes::{AtStart, Numbers, carried, center, ellipsoid, exact, messy};
 use hicp_core::{Correspondences, Isometry3, Matrix6, Point3, Surfel, Vector3, Vector6, se3};
 use hicp_metric::Minimize;
 use hicp_metric::{Degeneracy, NormalEquations, PointToPlane, PointToPoint};
@@ -41,15 +40,9 @@ fn monte_carlo(metric: &mut dyn Minimize, sigma: f64, plane: bool) -> (Matrix6<f
     let (mut predicted, mut sample) = (Matrix6::zeros(), Matrix6::zeros());
     for _ in 0..TRIALS {
         let pairs = noisy(&mut numbers, &source, &weights, sigma, plane);
-        let increment = metric
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let increment = metric.step(&pairs).unwrap().increment;
         let system = metric
-            .system(
-                &Iteration::default(),
-                &crate::scenes::advanced(&pairs, &increment),
-            )
+            .normal_equations(&crate::scenes::advanced(&pairs, &increment))
             .unwrap();
         predicted += system.covariance().unwrap() / f64::from(TRIALS);
         let xi = se3::log(&increment);
@@ -90,7 +83,7 @@ fn the_covariance_scales_with_the_variance_of_the_noise() {
         let mut numbers = Numbers(93);
         let pairs = noisy(&mut numbers, &source, &weights, sigma, true);
         PointToPlane
-            .system(&Iteration::default(), &pairs)
+            .normal_equations(&pairs)
             .unwrap()
             .covariance()
             .unwrap()
@@ -106,12 +99,12 @@ fn the_covariance_scales_with_the_variance_of_the_noise() {
     }
     let (a, b) = (
         PointToPlane
-            .system(&Iteration::default(), &pairs)
+            .normal_equations(&pairs)
             .unwrap()
             .covariance()
             .unwrap(),
         PointToPlane
-            .system(&Iteration::default(), &heavy)
+            .normal_equations(&heavy)
             .unwrap()
             .covariance()
             .unwrap(),
@@ -196,12 +189,12 @@ fn a_common_motion_transforms_the_covariance_by_the_adjoint() {
     let metrics: [Box<dyn Minimize>; 2] = [Box::new(PointToPlane), Box::new(PointToPoint)];
     for mut metric in metrics {
         let here = metric
-            .system(&Iteration::default(), &pairs)
+            .normal_equations(&pairs)
             .unwrap()
             .covariance()
             .unwrap();
         let there = metric
-            .system(&Iteration::default(), &moved)
+            .normal_equations(&moved)
             .unwrap()
             .covariance()
             .unwrap();
@@ -223,19 +216,13 @@ fn undetermined_poses_have_no_covariance() {
         .collect();
     let pairs = exact(&plane, &Isometry3::translation(0.0, 0.0, 0.001));
     assert_eq!(
-        PointToPlane
-            .system(&Iteration::default(), &pairs)
-            .unwrap()
-            .covariance(),
+        PointToPlane.normal_equations(&pairs).unwrap().covariance(),
         None
     );
     // Six rows determine the pose, but leave nothing to estimate the noise from.
     let six = messy(&mut numbers, 6);
     assert_eq!(
-        PointToPlane
-            .system(&Iteration::default(), &six)
-            .unwrap()
-            .covariance(),
+        PointToPlane.normal_equations(&six).unwrap().covariance(),
         None
     );
     // Pairs without weight are not rows.
@@ -244,10 +231,7 @@ fn undetermined_poses_have_no_covariance() {
         pair.weight = 0.0;
     }
     assert_eq!(
-        PointToPlane
-            .system(&Iteration::default(), &eight)
-            .unwrap()
-            .covariance(),
+        PointToPlane.normal_equations(&eight).unwrap().covariance(),
         None
     );
     // A sphere leaves its rotations undetermined.
@@ -262,15 +246,12 @@ fn undetermined_poses_have_no_covariance() {
         pair.target.point.z += 1e-3;
     }
     assert_eq!(
-        PointToPlane
-            .system(&Iteration::default(), &pairs)
-            .unwrap()
-            .covariance(),
+        PointToPlane.normal_equations(&pairs).unwrap().covariance(),
         None
     );
     assert!(
         PointToPoint
-            .system(&Iteration::default(), &pairs)
+            .normal_equations(&pairs)
             .unwrap()
             .covariance()
             .is_some()
@@ -308,7 +289,7 @@ fn a_direction_that_a_policy_freezes_has_no_covariance() {
         Degeneracy::FreezeRotations,
         Degeneracy::Refuse,
     ];
-    let free = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
+    let free = PointToPlane.normal_equations(&pairs).unwrap();
     let mut held = free;
     let axes = Isometry3::identity().rotation;
     held.freeze(&axes, &center(), [false; 3], [false, false, true]);

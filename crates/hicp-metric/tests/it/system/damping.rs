@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::scenes::center;
+use crate::scenes::{AtStart, center};
 use hicp_core::Iteration;
 use hicp_core::{Correspondences, Isometry3, Matrix6, Point3, Vector3, Vector6, so3};
 use hicp_metric::Minimize;
@@ -188,10 +188,7 @@ fn marquardts_damping_is_relative_to_the_diagonal_with_a_floor() {
             let mut once = solver(system.with_policy(policy, 0.0), &[2.0, 1.0]);
             once.initial_damping = lambda;
             once.max_iterations = 1;
-            let increment = once
-                .minimize(&Iteration::default(), &Correspondences::new())
-                .unwrap()
-                .increment;
+            let increment = once.step(&Correspondences::new()).unwrap().increment;
             let expected = h / (h + lambda * h.max(1e-6 * mean) + tikhonov);
             let found = turn(&increment) / (-RESIDUAL / LENGTH);
             assert!(
@@ -203,10 +200,7 @@ fn marquardts_damping_is_relative_to_the_diagonal_with_a_floor() {
         let mut once = solver(system.with_policy(Degeneracy::Freeze, 0.0), &[2.0, 1.0]);
         once.initial_damping = lambda;
         once.max_iterations = 1;
-        let increment = once
-            .minimize(&Iteration::default(), &Correspondences::new())
-            .unwrap()
-            .increment;
+        let increment = once.step(&Correspondences::new()).unwrap().increment;
         let found = turn(&increment) / (-RESIDUAL / LENGTH);
         assert!((found * (1.0 + lambda) - 1.0).abs() < 1e-9, "{found}");
     }
@@ -219,9 +213,7 @@ fn the_damping_follows_the_loss() {
     let system = system(1.0, 1.0).with_policy(Degeneracy::Ignore, 0.0);
     let mut solver = solver(system, &[10.0, 9.0, 9.5, 9.0, 8.0, 7.0, 7.0]);
     solver.max_iterations = 6;
-    let step = solver
-        .minimize(&Iteration::default(), &Correspondences::new())
-        .unwrap();
+    let step = solver.step(&Correspondences::new()).unwrap();
     let way = |lambda: f64| 1.0 / (1.0 + lambda);
     let accepted = way(1.0) + way(10.0);
     let expected = [
@@ -248,7 +240,7 @@ fn iterations_end_if_no_step_is_left() {
     let whole = system(1.0, 1.0).with_policy(Degeneracy::Ignore, 0.0);
     // The loss never falls: the iterations end when damping leaves almost nothing of the step.
     let mut never = solver(whole, &[1.0]);
-    let step = never.minimize(&Iteration::default(), &pairs).unwrap();
+    let step = never.step(&pairs).unwrap();
     assert_eq!(step.increment, Isometry3::identity());
     let found = tried(&never);
     assert!(found.len() < 20, "{}", found.len());
@@ -259,7 +251,7 @@ fn iterations_end_if_no_step_is_left() {
         content.add_row(&center(), &Vector3::x(), 0.0, 1.0);
     }
     let mut content = solver(content, &[1.0]);
-    let step = content.minimize(&Iteration::default(), &pairs).unwrap();
+    let step = content.step(&pairs).unwrap();
     assert_eq!(step.increment, Isometry3::identity());
     assert_eq!(tried(&content).len(), 1);
     // A step within the tolerance is the last one, whether it lowers the loss or not. Here all are,
@@ -267,7 +259,7 @@ fn iterations_end_if_no_step_is_left() {
     for losses in [[2.0, 1.0, 0.5], [2.0, 3.0, 4.0]] {
         let mut tolerant = solver(whole, &losses);
         tolerant.tolerance = RESIDUAL / LENGTH;
-        tolerant.minimize(&Iteration::default(), &pairs).unwrap();
+        tolerant.step(&pairs).unwrap();
         assert_eq!(tried(&tolerant).len(), 1, "{losses:?}");
     }
 }

@@ -1,7 +1,8 @@
 //! Tests of the undetermined motions of shapes, and that nothing moves along them.
 
-use crate::scenes::{Numbers, advanced, carried, center, ellipsoid, exact, messy, resized, surfel};
-use hicp_core::Iteration;
+use crate::scenes::{
+    AtStart, Numbers, advanced, carried, center, ellipsoid, exact, messy, resized, surfel,
+};
 use hicp_core::{Correspondences, Isometry3, Matrix6, Pair, Point3, Surfel, Vector3, Vector6};
 use hicp_metric::Minimize;
 use hicp_metric::{Conditioned, Degeneracy, NormalEquations, PointToPlane, PointToPoint};
@@ -46,7 +47,7 @@ fn line(numbers: &mut Numbers) -> Vec<Surfel> {
 }
 
 fn degenerate(metric: &mut dyn Minimize, pairs: &Correspondences) -> usize {
-    let system = metric.system(&Iteration::default(), pairs).unwrap();
+    let system = metric.normal_equations(pairs).unwrap();
     let found = system.observability().unwrap();
     found.n_degenerate(Degeneracy::THRESHOLD)
 }
@@ -93,7 +94,7 @@ fn directions_are_orthonormal_and_keep_the_residuals() {
     ] {
         let motion = numbers.motion(&center(), 100.0, 0.2);
         let pairs = carried(&at_rest(&source), &motion);
-        let system = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
+        let system = PointToPlane.normal_equations(&pairs).unwrap();
         let found = system.observability().unwrap();
         assert!(found.eigenvalues.is_sorted());
         assert!((found.eigenvalues[5] - 1.0).abs() < 1e-15);
@@ -103,10 +104,7 @@ fn directions_are_orthonormal_and_keep_the_residuals() {
         for (i, direction) in found.directions.iter().enumerate() {
             let along = found.motion(direction, 1e-3);
             let moved = advanced(&pairs, &along);
-            let rms = PointToPlane
-                .mean_loss(&Iteration::default(), &moved)
-                .unwrap()
-                .sqrt();
+            let rms = PointToPlane.loss(&moved).unwrap().sqrt();
             // A millimeter along an undetermined direction changes residuals only by roundings and
             // by the curvature.
             assert_eq!(rms < 2e-5, i < n, "{i} of {n}: {rms}");
@@ -142,9 +140,7 @@ fn nothing_slides_along_a_plane() {
             Degeneracy::FreezeUnexplained,
         ];
         for policy in [Degeneracy::Damp].into_iter().chain(freezing) {
-            let step = conditioned(PointToPlane, policy)
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap();
+            let step = conditioned(PointToPlane, policy).step(&pairs).unwrap();
             let shift = step.increment * middle - middle;
             let slide = shift - normal * shift.dot(&normal);
             assert!((shift.dot(&normal) - 0.004).abs() < 1e-6, "{policy:?}");
@@ -153,7 +149,7 @@ fn nothing_slides_along_a_plane() {
             assert!(turn.abs() < 1e-5, "{policy:?}: {turn}");
         }
         assert_eq!(
-            conditioned(PointToPlane, Degeneracy::Refuse).minimize(&Iteration::default(), &pairs),
+            conditioned(PointToPlane, Degeneracy::Refuse).step(&pairs),
             None
         );
     }
@@ -174,9 +170,7 @@ fn noisy_normals_do_not_let_a_plane_slide_under_freeze() {
             pair.target.point += (normal * (numbers.gaussian() * 0.001)).cast::<f32>();
         }
         let slide = |policy| {
-            let step = conditioned(PointToPlane, policy)
-                .minimize(&Iteration::default(), &pairs)
-                .unwrap();
+            let step = conditioned(PointToPlane, policy).step(&pairs).unwrap();
             let shift = step.increment * center() - center();
             (shift - normal * shift.dot(&normal)).norm()
         };
@@ -193,7 +187,7 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
     let mut numbers = Numbers(85);
     let pairs = messy(&mut numbers, 200);
     let expected = conditioned(PointToPlane, Degeneracy::Ignore)
-        .minimize(&Iteration::default(), &pairs)
+        .step(&pairs)
         .unwrap();
     for policy in [
         Degeneracy::Damp,
@@ -202,9 +196,7 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
         Degeneracy::FreezeUnexplained,
         Degeneracy::Refuse,
     ] {
-        let step = conditioned(PointToPlane, policy)
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap();
+        let step = conditioned(PointToPlane, policy).step(&pairs).unwrap();
         let (angle, distance) = crate::scenes::difference(&step.increment, &expected.increment);
         assert!(
             angle < 1e-5 && distance < 1e-6,
@@ -214,16 +206,13 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
     }
     // Damping is the default of the metric.
     let damped = conditioned(PointToPlane, Degeneracy::Damp)
-        .minimize(&Iteration::default(), &pairs)
+        .step(&pairs)
         .unwrap();
     assert_eq!(
         damped.increment,
-        PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment
+        PointToPlane.step(&pairs).unwrap().increment
     );
-    let system = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
+    let system = PointToPlane.normal_equations(&pairs).unwrap();
     assert_eq!(system.solve(), system.solve_with(Degeneracy::Damp, 0.5));
 }
 
@@ -232,7 +221,7 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
 fn weak_translations_are_solved_without_weak_rotations() {
     let mut numbers = Numbers(87);
     let plate = at_rest(&plane(&mut numbers));
-    let mut system = PointToPlane.system(&Iteration::default(), &plate).unwrap();
+    let mut system = PointToPlane.normal_equations(&plate).unwrap();
     // A thousandth of the information of the 200 points about their distance.
     let edge = 0.2_f64.sqrt();
     // Two edges across x on one side of the center, and one across y.
@@ -270,7 +259,7 @@ fn weak_translations_are_solved_without_weak_rotations() {
 fn weak_rotations_that_explain_the_loss_are_solved() {
     let mut numbers = Numbers(88);
     let plate = at_rest(&plane(&mut numbers));
-    let mut system = PointToPlane.system(&Iteration::default(), &plate).unwrap();
+    let mut system = PointToPlane.normal_equations(&plate).unwrap();
     let edge = 0.2_f64.sqrt();
     // Two edges, both of which a rotation of 0.03 around z moves to their place.
     for side in [0.1, -0.1] {
@@ -298,7 +287,7 @@ fn weak_rotations_that_explain_the_loss_are_solved() {
 fn thresholds_separate_degenerate_directions() {
     let mut numbers = Numbers(86);
     let pairs = messy(&mut numbers, 200);
-    let system = PointToPlane.system(&Iteration::default(), &pairs).unwrap();
+    let system = PointToPlane.normal_equations(&pairs).unwrap();
     let still = system.solve_with(Degeneracy::Freeze, 2.0).unwrap();
     assert!(crate::scenes::difference(&still, &Isometry3::identity()).1 < 1e-15);
     assert_eq!(system.solve_with(Degeneracy::Refuse, 2.0), None);
@@ -356,10 +345,7 @@ fn numbers_that_are_not_finite_give_none() {
         assert_eq!(empty.solve_with(policy, 1e-3), None);
         assert_eq!(silent.solve_with(policy, 1e-3), None, "{policy:?}");
         let mut metric = conditioned(PointToPlane, policy);
-        assert_eq!(
-            metric.minimize(&Iteration::default(), &Correspondences::new()),
-            None
-        );
+        assert_eq!(metric.step(&Correspondences::new()), None);
         let one: Correspondences = [Pair::new(
             0,
             surfel(center(), Vector3::z()),
@@ -368,6 +354,6 @@ fn numbers_that_are_not_finite_give_none() {
         )]
         .into_iter()
         .collect();
-        assert_eq!(metric.minimize(&Iteration::default(), &one), None);
+        assert_eq!(metric.step(&one), None);
     }
 }

@@ -1,14 +1,12 @@
 //! Tests of normal equations as the author of a custom metric uses them.
 
-use crate::scenes::{Numbers, messy};
-use hicp_core::Iteration;
+use crate::scenes::{AtStart, Numbers, messy};
 use hicp_core::{Matrix6, Point3, UnitQuaternion, Vector3, Vector6, se3, so3};
-use hicp_metric::Minimize;
 use hicp_metric::{Degeneracy, NormalEquations, PointToPlane};
 
 fn system(seed: u64) -> NormalEquations {
     PointToPlane
-        .system(&Iteration::default(), &messy(&mut Numbers(seed), 60))
+        .normal_equations(&messy(&mut Numbers(seed), 60))
         .unwrap()
 }
 

@@ -1,10 +1,8 @@
 //! Tests of the sandwich covariance: against its formula, and against Monte Carlo for weights that
 //! are not inverse variances.
 
-use crate::scenes::{Numbers, advanced, carried, center, ellipsoid, exact, messy};
-use hicp_core::Iteration;
+use crate::scenes::{AtStart, Numbers, advanced, carried, center, ellipsoid, exact, messy};
 use hicp_core::{Correspondences, Isometry3, Matrix6, Vector3, Vector6, se3};
-use hicp_metric::Minimize;
 use hicp_metric::{ErrorMetric, Generalized, PointToPlane, PointToPoint, sandwich_covariance};
 
 /// Returns the rows (J, r) of a pair around the camera origin, by the definitions of the two
@@ -88,16 +86,11 @@ fn monte_carlo_confirms_it_where_the_plain_covariance_is_wrong() {
             let normal = pair.target.normal.cast::<f64>().into_inner();
             pair.target.point += (normal * off).cast::<f32>();
         }
-        let increment = PointToPlane
-            .minimize(&Iteration::default(), &pairs)
-            .unwrap()
-            .increment;
+        let increment = PointToPlane.step(&pairs).unwrap().increment;
         let at_minimum = advanced(&pairs, &increment);
         let share = 1.0 / f64::from(TRIALS);
         robust += sandwich_covariance(&PointToPlane, &at_minimum).unwrap() * share;
-        let system = PointToPlane
-            .system(&Iteration::default(), &at_minimum)
-            .unwrap();
+        let system = PointToPlane.normal_equations(&at_minimum).unwrap();
         plain += system.covariance().unwrap() * share;
         let xi = se3::log(&increment);
         sample += xi * xi.transpose() * share;
