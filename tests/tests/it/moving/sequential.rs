@@ -1,7 +1,5 @@
 //! Tests of the sequential estimator along simulated paths (§V, §VI-C).
 
-use std::time::{Duration, Instant};
-
 use hicp_sim::{Household, RelativeGaussian, perturb, rng};
 use hicp_tests::{camera, median, render, symmetric_pose_distance};
 use hybrid_icp::core::{
@@ -376,81 +374,6 @@ fn an_initial_pose_of_nan_is_refused() {
         matches!(made, Err(FusionError::Translation { .. })),
         "{made:?}"
     );
-}
-
-/// Times the stage inside it.
-struct Timed<S> {
-    stage: S,
-    spent: std::sync::Arc<std::sync::Mutex<Duration>>,
-}
-
-impl<S: Stage> Stage for Timed<S> {
-    fn run(
-        &mut self,
-        problem: &Problem<'_>,
-        init: &Isometry3<f64>,
-        session: &mut Session<'_>,
-    ) -> Outcome {
-        let start = Instant::now();
-        let outcome = self.stage.run(problem, init, session);
-        *self.spent.lock().expect("one thread") += start.elapsed();
-        outcome
-    }
-}
-
-/// Run `cargo test -p hicp-tests --test it sequential -- --ignored --nocapture` on an idle machine.
-#[test]
-#[ignore = "measures time, which other work on the machine changes"]
-fn a_step_costs_less_than_a_hundredth_more_than_its_icp() {
-    // A step costs one render more than the stage and an optional score.
-    let path = path(Household::Mug, 11, 0.3, 8);
-    let (_, truth, _) = &path.frames[0];
-    let model = &path.model;
-    let unit = UnitCovariance::about_object(model.center(), model.radius()).expect("valid");
-    for (method, preset) in [
-        (FusionMethod::Average, Preset::ProjectiveCascadePointPlane),
-        (
-            FusionMethod::WeightedAverage,
-            Preset::ProjectiveCascadePointPlane,
-        ),
-        (FusionMethod::Average, Preset::Hybrid),
-        (FusionMethod::Filtering, Preset::Hybrid),
-    ] {
-        let spent = std::sync::Arc::default();
-        let timed = Timed {
-            stage: preset.build(),
-            spent: std::sync::Arc::clone(&spent),
-        };
-        let fuser = method.build(FuserConfig {
-            unit,
-            ..FuserConfig::default()
-        });
-        let config = SequentialConfig {
-            score: None,
-            ..SequentialConfig::default()
-        };
-        let mut estimator = SequentialEstimator::new(timed, fuser, config, truth).expect("valid");
-        let mut shares = Vec::new();
-        for round in 0..8 {
-            estimator.restart(truth).expect("valid");
-            for (observation, _, motion) in &path.frames {
-                *spent.lock().expect("one thread") = Duration::ZERO;
-                let start = Instant::now();
-                estimator.step(model, observation, motion);
-                let all = start.elapsed().as_secs_f64();
-                let icp = spent.lock().expect("one thread").as_secs_f64();
-                if round > 0 {
-                    shares.push((all - icp) / icp);
-                }
-            }
-        }
-        let share = median(&mut shares);
-        println!(
-            "{method} over {preset}: a step costs {:.2} % more than its ICP",
-            share * 100.0
-        );
-        assert!(share < 0.01, "{method} over {preset}: {share}");
-    }
 }
 
 #[test]
