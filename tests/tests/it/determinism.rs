@@ -1,4 +1,4 @@
-//! Checks that a pipeline returns the same bits in a second run, from a box, and on other threads.
+//! Checks that a pipeline returns the same bits in a second run and from a box.
 
 use hicp_sim::{Household, rng};
 use hicp_tests::{Scene, perturbed_scene};
@@ -41,25 +41,6 @@ fn a_second_run_gives_the_same_bits() {
             first,
             "{preset}, new refiner"
         );
-    }
-}
-
-#[test]
-fn every_thread_gives_the_same_bits() {
-    let cases = cases();
-    let expected = run(&mut Refiner::preset(Preset::Hybrid), &cases);
-    // The threads share the observations with their search trees.
-    let results: Vec<Vec<Refinement>> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..8)
-            .map(|_| scope.spawn(|| run(&mut Refiner::preset(Preset::Hybrid), &cases)))
-            .collect();
-        threads
-            .into_iter()
-            .map(|t| t.join().expect("no panic"))
-            .collect()
-    });
-    for result in results {
-        assert_eq!(result, expected);
     }
 }
 
@@ -116,53 +97,25 @@ fn boxed_parts_give_the_same_bits_as_static_ones() {
 #[test]
 fn preset_functions_build_the_presets_of_their_names() {
     let cases = cases();
-    let functions: [(Preset, Refiner); 14] = [
-        (Preset::Hybrid, Refiner::boxed(presets::hybrid())),
-        (
-            Preset::ProjectivePointToPoint,
-            Refiner::boxed(presets::projective_point_to_point()),
-        ),
-        (
-            Preset::ProjectivePointToPlane,
-            Refiner::boxed(presets::projective_point_to_plane()),
-        ),
-        (
-            Preset::ProjectiveCascadePointPlane,
-            Refiner::boxed(presets::projective_cascade_point_plane()),
-        ),
-        (
-            Preset::ProjectiveCascadePlanePoint,
-            Refiner::boxed(presets::projective_cascade_plane_point()),
-        ),
-        (
-            Preset::NnPointToPoint,
-            Refiner::boxed(presets::nn_point_to_point()),
-        ),
-        (
-            Preset::NnPointToPlane,
-            Refiner::boxed(presets::nn_point_to_plane()),
-        ),
-        (
-            Preset::NnCascadePointPlane,
-            Refiner::boxed(presets::nn_cascade_point_plane()),
-        ),
-        (
-            Preset::NnCascadePlanePoint,
-            Refiner::boxed(presets::nn_cascade_plane_point()),
-        ),
-        (
-            Preset::HybridVisible,
-            Refiner::boxed(presets::hybrid_visible()),
-        ),
-        (Preset::Local, Refiner::boxed(presets::local())),
-        (Preset::Search, Refiner::boxed(presets::search())),
-        (Preset::Auto, Refiner::boxed(presets::auto())),
-        (Preset::Color, Refiner::boxed(presets::color())),
+    let stages: [BoxedStage; Preset::ALL.len()] = [
+        Box::new(presets::hybrid()),
+        Box::new(presets::projective_point_to_point()),
+        Box::new(presets::projective_point_to_plane()),
+        Box::new(presets::projective_cascade_point_plane()),
+        Box::new(presets::projective_cascade_plane_point()),
+        Box::new(presets::nn_point_to_point()),
+        Box::new(presets::nn_point_to_plane()),
+        Box::new(presets::nn_cascade_point_plane()),
+        Box::new(presets::nn_cascade_plane_point()),
+        Box::new(presets::hybrid_visible()),
+        Box::new(presets::local()),
+        Box::new(presets::search()),
+        Box::new(presets::auto()),
+        Box::new(presets::color()),
     ];
-    assert_eq!(functions.each_ref().map(|(preset, _)| *preset), Preset::ALL);
     let mut results = Vec::new();
-    for (preset, mut refiner) in functions {
-        let found = run(&mut refiner, &cases);
+    for (preset, stage) in Preset::ALL.into_iter().zip(stages) {
+        let found = run(&mut Refiner::new(stage), &cases);
         assert_eq!(found, run(&mut Refiner::preset(preset), &cases), "{preset}");
         // `auto` equals `local` if the local pose is good, and `color` equals it without colors.
         let own = !matches!(preset, Preset::Auto | Preset::Color);

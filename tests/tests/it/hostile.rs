@@ -3,37 +3,15 @@
 use hicp_sim::{Household, Solid, perturb, rng};
 use hicp_tests::{Scene, camera, render, scene};
 use hybrid_icp::association::{Projective, VisibleSurface};
-use hybrid_icp::core::{
-    CameraError, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, TriMesh,
-    Vector3, se3,
-};
+use hybrid_icp::core::{DepthImage, Isometry3, Mask, Model, Observation, Point3, TriMesh, Vector3};
 use hybrid_icp::icp::{Convergence, Icp, IterationLimit, Termination, Verdict};
 use hybrid_icp::metric::PointToPlane;
 use hybrid_icp::{Preset, Refinement, Refiner};
 
+use crate::numbers::refine_all;
+
 fn mug() -> Scene {
     scene(Household::Mug, 0.0, &mut rng(5))
-}
-
-/// Refines with every preset and checks the properties of any outcome.
-fn refine_all(model: &Model, observation: &Observation, init: &Isometry3<f64>) -> Vec<Refinement> {
-    Preset::ALL
-        .into_iter()
-        .map(|preset| {
-            let refined = Refiner::preset(preset).refine(model, observation, init);
-            let pose = refined.outcome.camera_from_object;
-            assert!(se3::is_finite(&pose), "{preset}: {refined:?}");
-            assert!((0.0..=1.0).contains(&refined.mve), "{preset}: {refined:?}");
-            assert!(
-                (0.0..=1.0).contains(&refined.mve_initial),
-                "{preset}: {refined:?}"
-            );
-            if let Verdict::KeptInitial(_) = refined.outcome.verdict {
-                assert_eq!(pose, *init, "{preset}: a kept pose must have the same bits");
-            }
-            refined
-        })
-        .collect()
 }
 
 fn assert_no_pairs(refined: &[Refinement], init: &Isometry3<f64>) {
@@ -182,33 +160,4 @@ fn three_hundred_thousand_triangles_are_refined() {
     let init = perturb(&mut rng(2), &truth, 0.004, 0.05);
     let refined = Refiner::preset(Preset::Hybrid).refine(&model, &observation, &init);
     assert!(refined.mve < 0.05, "{refined:?}");
-}
-
-#[test]
-fn a_focal_length_of_zero_is_refused() {
-    assert_eq!(
-        PinholeCamera::new(0.0, 500.0, 320.0, 240.0, 640, 480),
-        Err(CameraError::FocalLength {
-            name: "fx",
-            value: 0.0
-        })
-    );
-    let error = PinholeCamera::new(500.0, f64::NAN, 320.0, 240.0, 640, 480).unwrap_err();
-    assert!(error.to_string().contains("fy is NaN"), "{error}");
-}
-
-#[test]
-fn a_far_initial_pose_ends_truthfully_and_one_that_is_not_finite_is_kept() {
-    let scene = mug();
-    let far = Isometry3::translation(0.0, 0.0, 1e6) * scene.truth;
-    refine_all(&scene.model, &scene.observation, &far);
-    let broken = Isometry3::translation(f64::NAN, 0.0, 0.5);
-    for preset in Preset::ALL {
-        let refined = Refiner::preset(preset).refine(&scene.model, &scene.observation, &broken);
-        assert_eq!(
-            refined.outcome.verdict,
-            Verdict::KeptInitial(Termination::NoPairs)
-        );
-        assert_eq!(refined.mve, 1.0);
-    }
 }

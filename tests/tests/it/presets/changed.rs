@@ -69,11 +69,3 @@ fn a_refiner_uses_the_given_renderer() {
     let expected = Refiner::preset(Preset::Hybrid).refine(&scene.model, &scene.observation, &init);
     assert_eq!(found, expected);
 }
-
-#[test]
-fn refiners_can_be_sent_to_threads() {
-    fn sent<T: Send>() {}
-    sent::<Refiner>();
-    sent::<Refiner<presets::Hybrid>>();
-    sent::<Refiner<presets::Search>>();
-}

@@ -72,6 +72,7 @@ fn errors_name_the_invalid_focal_length_or_center() {
     let below = MIN_FOCAL_LENGTH * (1.0 - f64::EPSILON);
     for value in [
         0.0,
+        -0.0,
         -1.0,
         1e-200,
         below,
