@@ -50,6 +50,20 @@ pub struct Row {
     pub kept: f64,
 }
 
+impl Row {
+    /// Checks that the median errors are below those of another row, multiplied by a factor.
+    ///
+    /// # Panics
+    ///
+    /// If one is not.
+    #[track_caller]
+    pub fn assert_below(&self, factor: f64, other: &Row) {
+        let below =
+            self.degrees < factor * other.degrees && self.millimeters < factor * other.millimeters;
+        assert!(below, "{self:?}\n{other:?}");
+    }
+}
+
 /// Runs a pipeline from every start.
 ///
 /// # Panics

@@ -1,10 +1,11 @@
 //! A custom point selection: the visible surface without occluded points.
 
+use super::icp;
 use hicp_testkit::check_selection;
 use hicp_tests::starts::{Start, measure_stage, starts};
 use hybrid_icp::association::{NearestNeighbor, PointSelection, VisibleSurface};
 use hybrid_icp::core::{Context, Isometry3, Surfel};
-use hybrid_icp::icp::{Divergence, Icp, IterationLimit, SmallMotion, Stage};
+use hybrid_icp::icp::Stage;
 use hybrid_icp::metric::PointToPlane;
 
 // --- The component ---
@@ -44,17 +45,7 @@ impl<P: PointSelection> PointSelection for Unhidden<P> {
 // --- Its tests ---
 
 fn nearest<P: PointSelection>(selection: P) -> impl Stage {
-    Icp {
-        selection,
-        association: NearestNeighbor::default(),
-        filter: (),
-        metric: PointToPlane,
-        stop: (
-            Divergence::count_aware(),
-            SmallMotion::default(),
-            IterationLimit(50),
-        ),
-    }
+    icp(selection, NearestNeighbor::default(), PointToPlane)
 }
 
 fn unhidden() -> Unhidden<VisibleSurface> {
@@ -77,9 +68,5 @@ fn behind_an_obstacle_it_refines_where_the_whole_visible_surface_is_misled() {
     }
     let plain = measure_stage(&mut nearest(VisibleSurface::default()), &starts);
     let mine = measure_stage(&mut nearest(unhidden()), &starts);
-    assert!(mine.degrees < 0.7 * plain.degrees, "{mine:?}\n{plain:?}");
-    assert!(
-        mine.millimeters < 0.7 * plain.millimeters,
-        "{mine:?}\n{plain:?}"
-    );
+    mine.assert_below(0.7, &plain);
 }

@@ -1,5 +1,6 @@
 //! A custom switcher: selects by how well the visible normals determine a point-to-plane step.
 
+use super::icp;
 use hicp_sim::{Household, rng};
 use hicp_testkit::{SwitcherLaws, check_switcher};
 use hicp_tests::{Scene, camera, perturbed_scene, render};
@@ -8,9 +9,7 @@ use hybrid_icp::association::{NearestNeighbor, Projective, SearchIndex, Stride, 
 use hybrid_icp::core::{
     Context, Isometry3, Matrix3, NO_TRIANGLE, Observation, UnitQuaternion, Vector3,
 };
-use hybrid_icp::icp::{
-    Divergence, Icp, IterationLimit, Observer, Regime, RegimeEvent, SmallMotion, Stage,
-};
+use hybrid_icp::icp::{Divergence, Icp, IterationLimit, Observer, Regime, RegimeEvent, Stage};
 use hybrid_icp::metric::{PointToPlane, PointToPoint};
 use hybrid_icp::switch::{Switch, Switcher};
 
@@ -66,17 +65,7 @@ impl Switcher for Planarity {
 const PLANARITY: Planarity = Planarity { bound: 0.02 };
 
 fn planes() -> impl Stage + Send + 'static {
-    Icp {
-        selection: VisibleSurface::default(),
-        association: Projective,
-        filter: (),
-        metric: PointToPlane,
-        stop: (
-            Divergence::count_aware(),
-            SmallMotion::default(),
-            IterationLimit(50),
-        ),
-    }
+    icp(VisibleSurface::default(), Projective, PointToPlane)
 }
 
 fn switching() -> impl Stage + Send + 'static {
