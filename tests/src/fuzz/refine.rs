@@ -2,6 +2,7 @@
 //!
 //! The bytes define a small mesh, camera, depth image, mask, pose and pipeline.
 
+use hybrid_icp::core::internal::pose_bits;
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, PinholeCamera, Point3,
     Symmetries, SymmetryAxis, TriMesh, Vector3, se3,
@@ -44,11 +45,6 @@ fn check_outcome(refined: &Refinement, init: &Isometry3<f64>) {
             "a kept pose must have the same bits: {refined:?} from {init:?}"
         );
     }
-}
-
-fn pose_bits(pose: &Isometry3<f64>) -> [u64; 7] {
-    let (t, q) = (pose.translation.vector, pose.rotation.coords);
-    [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
 }
 
 fn bits(refined: &Refinement) -> ([u64; 7], u64, u64) {

@@ -8,6 +8,7 @@ use hicp_sim::{Household, perturb, rng};
 use hicp_tests::{Scene, camera, render, scene};
 use hybrid_icp::association::{AllSamples, DataAssociation, Projective, VisibleSurface};
 use hybrid_icp::core::Iteration;
+use hybrid_icp::core::internal::pose_bits as bits;
 use hybrid_icp::core::{
     Context, Correspondences, DepthImage, Isometry3, Mask, Observation, Pair, PinholeCamera,
     RigidTransform, Surfel, UnitVector3, Vector3, se3,
@@ -20,11 +21,6 @@ use hybrid_icp::metric::{
     PointToPoint, Symmetric,
 };
 use hybrid_icp::{BoxedStage, Preset, Refiner};
-
-fn bits(pose: &Isometry3<f64>) -> [u64; 7] {
-    let (t, q) = (pose.translation.vector, pose.rotation.coords);
-    [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
-}
 
 /// Without a pair there is nothing to measure. A perfect 0 or an identity pose would be false.
 #[test]

@@ -34,6 +34,7 @@ use std::path::Path;
 use hicp_sim::{Household, RelativeGaussian, object_pose, perturb, rng};
 use hicp_tests::{Scene, camera, render};
 use hybrid_icp::BoxedStage;
+use hybrid_icp::core::internal::pose_bits as bits;
 use hybrid_icp::core::{Isometry3, Model, ModelConfig, Observation, se3};
 use hybrid_icp::icp::{Outcome, Session, Verdict, Workspace};
 use hybrid_icp::pipeline::PipelineFile;
@@ -204,11 +205,6 @@ fn build(text: &str) -> BoxedStage {
 fn run(stage: &mut BoxedStage, workspace: &mut Workspace, case: &Case) -> Outcome {
     let problem = case.scene.problem();
     stage.run(&problem, &case.init, &mut Session::new(workspace, &mut ()))
-}
-
-fn bits(pose: &Isometry3<f64>) -> [u64; 7] {
-    let (t, q) = (pose.translation.vector, pose.rotation.coords);
-    [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
 }
 
 /// Checks the properties of every outcome, whatever the parts.
