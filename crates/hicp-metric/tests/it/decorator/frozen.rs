@@ -283,7 +283,7 @@ fn boxed(angle: f64) -> Correspondences {
         .map(|i| {
             let mut normal = Vector3::zeros();
             normal[i % 3] = if i % 2 == 0 { 1.0 } else { -1.0 };
-            let mut offset = numbers.vector().component_mul(&sides);
+            let mut offset = numbers.signs().component_mul(&sides);
             offset[i % 3] = normal[i % 3] * sides[i % 3];
             surfel(center() + offset, normal)
         })

@@ -244,7 +244,7 @@ fn residuals_do_not_scale_the_covariance_of_a_prior() {
             .map(|i| {
                 let (x, y) = (numbers.sign() * 0.05, numbers.sign() * 0.05);
                 let at = |z| surfel(Point3::new(x, y, z), -Vector3::z());
-                Pair::new(i, at(0.5), i, at(0.5 + noise * numbers.gaussian()))
+                Pair::new(i, at(0.5), i, at(0.5 + noise * numbers.normal()))
             })
             .collect();
         let pairs = at(&pose, &plane);

@@ -162,7 +162,7 @@ fn contaminated(numbers: &mut Numbers, motion: &Isometry3<f64>, share: f64) -> C
         let off = if numbers.unit() < share {
             normal * 0.05 + hicp_core::Vector3::x() * 0.05
         } else {
-            normal * (0.0005 * numbers.gaussian())
+            normal * (0.0005 * numbers.normal())
         };
         pair.target.point += off.cast::<f32>();
     }

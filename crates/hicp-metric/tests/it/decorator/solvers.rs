@@ -107,7 +107,7 @@ fn levenberg_marquardt_never_raises_the_loss() {
         let motion = numbers.motion(&center(), 100.0, 0.1);
         let mut pairs = advanced(&messy(&mut numbers, 30), &motion);
         for pair in &mut pairs.as_mut_slice()[..10] {
-            pair.target.point += (numbers.vector() * 0.2).cast::<f32>();
+            pair.target.point += (numbers.signs() * 0.2).cast::<f32>();
         }
         for mut metric in metrics() {
             let before = metric.loss(&pairs).unwrap();

@@ -1,8 +1,8 @@
 //! Tests of point-to-plane: its definition, its invariances, and motions that it must not cause.
 
-use crate::pairs::support::Numbers;
 use crate::pairs::{ellipsoid, moved, pair, small_motion};
 use crate::scenes::AtStart;
+use crate::support::Numbers;
 use hicp_core::{Correspondences, Matrix6, Pair, Point3, Vector3, Vector6, se3, so3};
 use hicp_metric::PointToPlane;
 

@@ -1,8 +1,8 @@
 //! Tests of point-to-plane: units, distance, accuracy, and pairs with little information.
 
-use crate::pairs::support::{Numbers, median};
 use crate::pairs::{ellipsoid, moved, pair, small_motion};
 use crate::scenes::AtStart;
+use crate::support::{Numbers, median};
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, se3, so3};
 use hicp_metric::PointToPlane;
 

@@ -1,8 +1,8 @@
 //! Tests of the closed form of point-to-point: exact, always a rotation, and the best one.
 
-use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, loss, pair, rms, rounding};
 use crate::scenes::AtStart;
+use crate::support::Numbers;
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Vector3, Vector6, se3};
 use hicp_metric::{ErrorMetric, NormalEquations, PointToPoint};
 

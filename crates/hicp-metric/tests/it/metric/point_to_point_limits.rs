@@ -1,8 +1,8 @@
 //! Tests of point-to-point with few pairs, without weight, far away, and at one place.
 
-use crate::pairs::support::Numbers;
 use crate::pairs::{determinant, images, pair, rms, rounding};
 use crate::scenes::AtStart;
+use crate::support::Numbers;
 use hicp_core::{Correspondences, Isometry3, Point3, Vector3, se3};
 use hicp_metric::{PointToPoint, Step};
 

@@ -66,7 +66,7 @@ fn pairs_of_different_sides_are_skipped() {
     for _ in 0..20 {
         let mut wrong = pairs.as_slice()[0];
         wrong.target = surfel(
-            center() + numbers.vector(),
+            center() + numbers.signs(),
             -wrong.source.normal.cast::<f64>().into_inner(),
         );
         assert_eq!(Symmetric.squared_error(&wrong).to_bits(), NO_ROWS.to_bits());

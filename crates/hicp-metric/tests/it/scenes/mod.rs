@@ -1,6 +1,6 @@
 //! Pairs on known surfaces.
 
-use std::f64::consts::PI;
+pub(crate) use crate::support::Numbers;
 
 use hicp_core::{
     Correspondences, Isometry3, Iteration, Pair, Point3, Surfel, UnitVector3, Vector3, Vector6, se3,
@@ -24,44 +24,15 @@ pub trait AtStart: Minimize {
 
 impl<M: Minimize + ?Sized> AtStart for M {}
 
-/// A seeded generator (SplitMix64) with the same numbers on every platform.
-#[derive(Clone, Debug)]
-pub struct Numbers(pub u64);
-
 impl Numbers {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Returns a number in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
     /// Returns a number in [−1, 1).
     pub fn sign(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
+        self.between(-1.0, 1.0)
     }
 
-    pub fn vector(&mut self) -> Vector3<f64> {
+    /// Returns a vector in the cube from −1 to 1.
+    pub fn signs(&mut self) -> Vector3<f64> {
         Vector3::new(self.sign(), self.sign(), self.sign())
-    }
-
-    pub fn direction(&mut self) -> Vector3<f64> {
-        loop {
-            let v = self.vector();
-            if v.norm() > 0.1 && v.norm() <= 1.0 {
-                return v.normalize();
-            }
-        }
-    }
-
-    pub fn gaussian(&mut self) -> f64 {
-        let (a, b) = (1.0 - self.unit(), self.unit());
-        (-2.0 * a.ln()).sqrt() * (2.0 * PI * b).cos()
     }
 
     /// Returns a rotation by `degrees` around a random axis through `center`, and a shift of
@@ -124,8 +95,8 @@ pub fn messy(numbers: &mut Numbers, count: usize) -> Correspondences {
     let motion = numbers.motion(&center(), 4.0, 0.01);
     let mut pairs = exact(&source, &motion);
     for pair in pairs.as_mut_slice() {
-        pair.target.point += (numbers.vector() * 0.003).cast::<f32>();
-        let normal = pair.target.normal.cast::<f64>().into_inner() + numbers.vector() * 0.2;
+        pair.target.point += (numbers.signs() * 0.003).cast::<f32>();
+        let normal = pair.target.normal.cast::<f64>().into_inner() + numbers.signs() * 0.2;
         pair.target.normal = UnitVector3::new_unchecked(normal.normalize().cast());
         pair.weight = 0.2 + numbers.unit() as f32;
     }

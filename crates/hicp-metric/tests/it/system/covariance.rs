@@ -20,9 +20,9 @@ fn noisy(
         pair.weight = *weight;
         let sigma = sigma / f64::from(*weight).sqrt();
         let off = if plane {
-            pair.target.normal.cast::<f64>().into_inner() * (sigma * numbers.gaussian())
+            pair.target.normal.cast::<f64>().into_inner() * (sigma * numbers.normal())
         } else {
-            Vector3::new(numbers.gaussian(), numbers.gaussian(), numbers.gaussian()) * sigma
+            Vector3::new(numbers.normal(), numbers.normal(), numbers.normal()) * sigma
         };
         pair.target.point += off.cast::<f32>();
     }
@@ -118,9 +118,9 @@ fn displaced(offset: &Vector3<f64>, pivot: &Point3<f64>) -> NormalEquations {
     let mut numbers = Numbers(94);
     let mut system = NormalEquations::new(pivot + offset, 0.05);
     for _ in 0..100 {
-        let point = center() + numbers.vector() * 0.05 + offset;
+        let point = center() + numbers.signs() * 0.05 + offset;
         let (direction, weight) = (numbers.direction(), 0.5 + numbers.unit());
-        system.add_row(&point, &direction, 1e-3 * numbers.gaussian(), weight);
+        system.add_row(&point, &direction, 1e-3 * numbers.normal(), weight);
     }
     system
 }
@@ -132,9 +132,9 @@ fn information_is_around_the_camera_origin_for_every_pivot() {
         let mut numbers = Numbers(94);
         let (mut information, mut gradient) = (Matrix6::zeros(), Vector6::zeros());
         for _ in 0..100 {
-            let point = center() + numbers.vector() * 0.05;
+            let point = center() + numbers.signs() * 0.05;
             let (d, w) = (numbers.direction(), 0.5 + numbers.unit());
-            let r = 1e-3 * numbers.gaussian();
+            let r = 1e-3 * numbers.normal();
             let lever = point.coords.cross(&d);
             let row = Vector6::new(d.x, d.y, d.z, lever.x, lever.y, lever.z);
             information += row * row.transpose() * w;
@@ -265,7 +265,7 @@ fn a_direction_that_a_policy_freezes_has_no_covariance() {
     // A can whose normals waver: its rotation around z has about 10⁻⁴ of the information.
     let can: Vec<_> = (0..300)
         .map(|i| {
-            let around = Vector3::new(numbers.gaussian(), numbers.gaussian(), 0.0).normalize();
+            let around = Vector3::new(numbers.normal(), numbers.normal(), 0.0).normalize();
             let side = Vector3::z() * numbers.sign() + around;
             let cap = Vector3::z() + around * numbers.unit();
             let waver = Vector3::z().cross(&around) * (0.01 * numbers.sign());
@@ -280,7 +280,7 @@ fn a_direction_that_a_policy_freezes_has_no_covariance() {
     let mut pairs = exact(&can, &Isometry3::identity());
     for pair in pairs.as_mut_slice() {
         let along = pair.target.normal.cast::<f64>().into_inner();
-        pair.target.point += (along * (5e-4 * numbers.gaussian())).cast::<f32>();
+        pair.target.point += (along * (5e-4 * numbers.normal())).cast::<f32>();
     }
     let policies = [
         Degeneracy::Damp,

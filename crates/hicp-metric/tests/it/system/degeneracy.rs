@@ -164,10 +164,9 @@ fn noisy_normals_do_not_let_a_plane_slide_under_freeze() {
         let (mut pairs, normal) = lifted(&mut numbers, &Isometry3::identity());
         for pair in pairs.as_mut_slice() {
             // Normals off by a degree, points by a millimeter.
-            let tilted =
-                -normal + Vector3::new(numbers.gaussian(), numbers.gaussian(), 0.0) * 0.017;
+            let tilted = -normal + Vector3::new(numbers.normal(), numbers.normal(), 0.0) * 0.017;
             pair.target = surfel(pair.target.point.cast(), tilted);
-            pair.target.point += (normal * (numbers.gaussian() * 0.001)).cast::<f32>();
+            pair.target.point += (normal * (numbers.normal() * 0.001)).cast::<f32>();
         }
         let slide = |policy| {
             let step = conditioned(PointToPlane, policy).step(&pairs).unwrap();

@@ -34,7 +34,7 @@ fn the_policy_of_a_system_applies_to_its_solution() {
 #[test]
 fn frozen_components_neither_move_nor_rotate_the_center() {
     let mut numbers = Numbers(5);
-    let axes = UnitQuaternion::new(numbers.vector());
+    let axes = UnitQuaternion::new(numbers.signs());
     let center = Point3::new(0.1, -0.05, 0.7);
     let mut held = system(5);
     let free = held.solve().unwrap();

@@ -82,7 +82,7 @@ fn monte_carlo_confirms_it_where_the_plain_covariance_is_wrong() {
     for _ in 0..TRIALS {
         let mut pairs = exact(&source, &Isometry3::identity());
         for pair in pairs.as_mut_slice() {
-            let off = numbers.gaussian() * sigma(f64::from(pair.source.point.z));
+            let off = numbers.normal() * sigma(f64::from(pair.source.point.z));
             let normal = pair.target.normal.cast::<f64>().into_inner();
             pair.target.point += (normal * off).cast::<f32>();
         }
