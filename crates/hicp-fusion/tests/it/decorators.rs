@@ -78,7 +78,7 @@ fn the_gate_passes_what_its_covariances_allow() {
         restart_after: None,
         ..Gate::default()
     };
-    let truth = random.pose(0.5);
+    let truth = random.motion(0.5);
     let rejected = (0..4000)
         .filter(|_| {
             let mut fuser = average(gate);

@@ -21,7 +21,7 @@ fn the_squared_mahalanobis_distance_is_that_of_the_difference() {
     let mut random = Random(3);
     for _ in 0..20 {
         let (sa, sb) = (random.covariance(0.01), random.covariance(0.02));
-        let pose = random.pose(1.0);
+        let pose = random.motion(1.0);
         let xi = random.twist(0.01);
         let (a, b) = (estimate(se3::exp(&xi) * pose, sa), estimate(pose, sb));
         let expected = xi.dot(&((sa + sb).try_inverse().unwrap() * xi));
@@ -51,7 +51,7 @@ fn a_cleared_workspace_fuses_as_a_new_one() {
 #[test]
 fn uses_covariances_is_true_if_the_pose_depends_on_them() {
     let mut random = Random(5);
-    let center = random.pose(1.0);
+    let center = random.motion(1.0);
     let poses: Vec<Isometry3<f64>> = (0..4)
         .map(|_| se3::exp(&random.twist(0.01)) * center)
         .collect();

@@ -144,7 +144,7 @@ fn the_gradient_is_zero_at_the_result() {
 #[test]
 fn identical_poses_have_a_kth_of_the_covariance() {
     let mut random = Random(2);
-    let (pose, covariance) = (random.pose(1.0), random.covariance(0.3));
+    let (pose, covariance) = (random.motion(1.0), random.covariance(0.3));
     for count in [1_u32, 2, 7] {
         let estimates = vec![estimate(pose, covariance); count as usize];
         let fused = fused(&estimates);
@@ -164,7 +164,7 @@ fn neither_the_order_nor_the_start_matters() {
         let mut shuffled = estimates.clone();
         shuffled.sort_by_cached_key(|_| random.uniform().to_bits());
         let fusion = fusion(&shuffled, EXACT);
-        let start = random.pose(0.7) * expected.estimate.camera_from_object();
+        let start = random.motion(0.7) * expected.estimate.camera_from_object();
         let found = fusion.solve(&start).unwrap();
         assert!(
             apart(
@@ -181,7 +181,7 @@ fn fusing_is_equivariant_under_the_adjoint() {
     let mut random = Random(4);
     for _ in 0..20 {
         let estimates = random.estimates(5, 0.3);
-        let motion = random.pose(1.5);
+        let motion = random.motion(1.5);
         let adjoint = se3::adjoint(&motion);
         let carried = |covariance: &Matrix6<f64>| adjoint * covariance * adjoint.transpose();
         let moved: Vec<PoseEstimate> = estimates
@@ -212,7 +212,7 @@ fn a_single_estimate_is_returned_unchanged() {
     let mut random = Random(5);
     let only = random.estimates(1, 0.3);
     let fusion = fusion(&only, EXACT);
-    let fused = fusion.solve(&random.pose(0.7)).unwrap();
+    let fused = fusion.solve(&random.motion(0.7)).unwrap();
     assert!(
         apart(
             fused.estimate.camera_from_object(),
@@ -240,8 +240,8 @@ fn the_covariance_of_a_mean_is_that_of_its_estimates() {
 #[test]
 fn one_wild_outlier_is_averaged_in_by_its_covariance() {
     let mut random = Random(6);
-    let pose = random.pose(1.0);
-    let wild = random.pose(1.0) * pose;
+    let pose = random.motion(1.0);
+    let wild = random.motion(1.0) * pose;
     let mut estimates = vec![estimate(pose, Matrix6::identity() * 1e-4); 9];
     // As certain as the others: it moves the pose by about a tenth of the distance.
     estimates.push(estimate(wild, Matrix6::identity() * 1e-4));
@@ -315,7 +315,7 @@ fn estimates_spread_over_half_a_turn() {
 #[test]
 fn zero_and_huge_covariances() {
     let mut random = Random(7);
-    let poses = [random.pose(0.3), random.pose(0.3), random.pose(0.3)];
+    let poses = [random.motion(0.3), random.motion(0.3), random.motion(0.3)];
     let unit = Matrix6::identity() * 1e-2;
     let with = |covariances: [Matrix6<f64>; 3]| {
         let estimates: Vec<PoseEstimate> = poses
@@ -373,7 +373,7 @@ fn zero_and_huge_covariances() {
 fn the_mean_cost_is_that_of_its_degrees_of_freedom() {
     // V is half a χ² of 6K − 6 degrees of freedom if the noise is small: 6 for three estimates.
     let mut random = Random(8);
-    let truth = random.pose(1.0);
+    let truth = random.motion(1.0);
     let runs = 2000;
     let (mut total, mut covered) = (0.0, 0.0);
     for _ in 0..runs {

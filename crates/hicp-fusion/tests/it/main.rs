@@ -14,4 +14,5 @@ mod fusion;
 mod methods;
 mod motion;
 mod solver;
+mod support;
 mod symmetry;

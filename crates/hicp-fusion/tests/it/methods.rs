@@ -60,11 +60,11 @@ fn most_confident_is_the_most_certain_for_any_camera_motion() {
     let mut fuser = MostConfident::new(Transport::Adjoint);
     let mut carried = Isometry3::identity();
     let mves = [0.5, 0.2, 0.7, 0.3];
-    let poses = [0; 4].map(|_| random.pose(0.4));
+    let poses = [0; 4].map(|_| random.motion(0.4));
     for (pose, mve) in poses.iter().zip(mves) {
         let now = carried * pose;
         fuser.update(&estimate(now, unit.at(&now) * mve));
-        let motion = random.pose(1.0);
+        let motion = random.motion(1.0);
         fuser.propagate(&CameraMotion::new(motion).unwrap());
         carried = motion * carried;
     }
@@ -112,7 +112,7 @@ fn average_weighs_equally_for_all_covariances() {
     );
     // Its covariance follows from those of the estimates: that of a mean of K is a K-th of their
     // mean.
-    let pose = random.pose(0.5);
+    let pose = random.motion(0.5);
     let together: Vec<PoseEstimate> = estimates
         .iter()
         .map(|e| estimate(pose, *e.covariance()))
@@ -247,7 +247,7 @@ fn the_unit_around_an_object_does_not_depend_on_the_camera() {
     let mut random = Random(22);
     let unit = exact().unit;
     for _ in 0..20 {
-        let (pose, motion) = (random.pose(1.0), random.pose(1.0));
+        let (pose, motion) = (random.motion(1.0), random.motion(1.0));
         let adjoint = se3::adjoint(&motion);
         let carried = adjoint * unit.at(&pose) * adjoint.transpose();
         assert!(relative(&unit.at(&(motion * pose)), &carried) < 1e-13);

@@ -11,7 +11,7 @@ use hicp_fusion::{
 fn a_moved_camera_changes_only_the_frame() {
     let mut random = Random(18);
     let estimates = random.estimates(5, 0.2);
-    let motion = random.pose(1.2);
+    let motion = random.motion(1.2);
     let adjoint = se3::adjoint(&motion);
     let there: Vec<PoseEstimate> = estimates
         .iter()
@@ -43,7 +43,7 @@ fn a_moved_camera_changes_only_the_frame() {
 #[test]
 fn kept_covariances_do_not_change() {
     let mut random = Random(19);
-    let motion = CameraMotion::new(random.pose(1.0)).unwrap();
+    let motion = CameraMotion::new(random.motion(1.0)).unwrap();
     let estimates = random.estimates(2, 0.3);
     for method in FusionMethod::ALL {
         let mut fuser = method.build(FuserConfig {
@@ -81,7 +81,7 @@ fn kept_covariances_do_not_change() {
 fn an_uncertain_motion_adds_its_covariance() {
     let mut random = Random(20);
     let own = random.covariance(0.01);
-    let motion = CameraMotion::new(random.pose(0.3)).unwrap();
+    let motion = CameraMotion::new(random.motion(0.3)).unwrap();
     let uncertain = motion.with_covariance(&own).unwrap();
     let estimates = random.estimates(3, 0.05);
     for method in FusionMethod::ALL {
@@ -161,10 +161,10 @@ impl Held {
 #[test]
 fn held_estimates_are_moved_by_every_motion() {
     let mut random = Random(24);
-    let (mut center, own) = (random.pose(1.0), random.covariance(0.02));
+    let (mut center, own) = (random.motion(1.0), random.covariance(0.02));
     let motions: Vec<CameraMotion> = (0..4)
         .map(|index| {
-            let motion = CameraMotion::new(random.pose(0.8)).unwrap();
+            let motion = CameraMotion::new(random.motion(0.8)).unwrap();
             match index {
                 1 | 3 => motion.with_covariance(&own).unwrap(),
                 _ => motion,
@@ -231,7 +231,7 @@ fn held_estimates_are_moved_by_every_motion() {
 fn a_motion_costs_no_evaluations() {
     let mut random = Random(25);
     let estimates = random.estimates(6, 0.1);
-    let motion = random.pose(1.5);
+    let motion = random.motion(1.5);
     for make in [BatchFuser::weighted_average, BatchFuser::average] {
         let config = FuserConfig {
             unit: exact().unit,

@@ -20,7 +20,7 @@ fn scattered(seed: u64) -> Vec<PoseEstimate> {
     let mut random = Random(seed);
     (0..3)
         .map(|_| {
-            let pose = random.pose(2.5);
+            let pose = random.motion(2.5);
             estimate(pose, random.covariance(3.0))
         })
         .collect()
@@ -37,7 +37,7 @@ fn solved(estimates: &[PoseEstimate], max_iterations: usize) -> Fused {
 fn the_cost_is_half_the_sum_of_the_squared_distances() {
     let mut random = Random(41);
     let estimates = random.estimates(4, 0.5);
-    let pose = random.pose(1.0);
+    let pose = random.motion(1.0);
     let expected: f64 = estimates
         .iter()
         .map(|each| {
@@ -133,7 +133,7 @@ fn the_iteration_ends_if_rounding_hides_the_minimum() {
     let away = Isometry3::translation(0.0, 1000.0, 1000.0);
     for seed in 0..40 {
         let mut random = Random(seed);
-        let poses = [0; 5].map(|_| random.pose(0.1));
+        let poses = [0; 5].map(|_| random.motion(0.1));
         let seen = |camera: &Isometry3<f64>| -> Vec<PoseEstimate> {
             let poses = poses.iter().map(|pose| camera * pose);
             poses

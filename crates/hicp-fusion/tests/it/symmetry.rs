@@ -82,7 +82,7 @@ fn every_symmetric_pose_is_mapped_to_the_representative() {
     });
     let mut random = Random(32);
     for _ in 0..20 {
-        let reference = random.pose(0.5);
+        let reference = random.motion(0.5);
         let near = se3::exp(&random.twist(0.05)) * reference;
         for symmetry in &cube {
             // A group: the inverse of every symmetry is a symmetry.
@@ -113,7 +113,7 @@ fn every_rotation_around_an_axis_is_mapped_to_the_representative() {
     // The closed form against a search, for poses that also differ in other directions.
     let mut random = Random(33);
     for _ in 0..10 {
-        let pose = random.pose(0.5) * reference * axis.rotation(PI * random.uniform());
+        let pose = random.motion(0.5) * reference * axis.rotation(PI * random.uniform());
         let found = fuser.representative(&pose, &reference);
         let angle = |pose: &Isometry3<f64>| se3::pose_distance(pose, &reference).0;
         let best = (0..3600)
@@ -174,7 +174,7 @@ fn every_rotation_of_a_sphere_is_a_symmetry() {
         let inner = BatchFuser::average(FuserConfig::default());
         let fuser = SymmetryAware::new(inner, symmetries, center, 0.1).unwrap();
         for _ in 0..20 {
-            let (reference, pose) = (random.pose(1.0), random.pose(2.0));
+            let (reference, pose) = (random.motion(1.0), random.motion(2.0));
             let found = fuser.representative(&pose, &reference);
             assert!(se3::pose_distance(&found, &reference).0 < 1e-14);
             // The ball stays at its observed position.
@@ -212,15 +212,15 @@ fn the_representative_is_the_nearest_of_all() {
     let (center, radius) = (Point3::new(0.2, -0.1, 0.1), 0.3);
     let mut chosen = std::collections::BTreeSet::new();
     for _ in 0..200 {
-        let motions: Vec<Isometry3<f64>> = (0..6).map(|_| random.pose(0.4)).collect();
+        let motions: Vec<Isometry3<f64>> = (0..6).map(|_| random.motion(0.4)).collect();
         let symmetries = Symmetries {
             discrete: motions.clone(),
             continuous: vec![],
         };
         let inner = BatchFuser::average(FuserConfig::default());
         let fuser = SymmetryAware::new(inner, symmetries, center, radius).unwrap();
-        let reference = random.pose(1.0);
-        let pose = reference * random.pose(0.5);
+        let reference = random.motion(1.0);
+        let pose = reference * random.motion(0.5);
         let distance = |pose: &Isometry3<f64>| {
             let angle = (pose.rotation * reference.rotation.inverse()).angle();
             angle.powi(2) * radius.powi(2) + (pose * center - reference * center).norm_squared()
@@ -247,7 +247,7 @@ fn a_pose_represents_itself() {
     let mut random = Random(38);
     for longer in [0.0, 1e-9] {
         for _ in 0..20 {
-            let mut pose = random.pose(1.0);
+            let mut pose = random.motion(1.0);
             let quaternion = pose.rotation.into_inner() * (1.0 + longer);
             pose.rotation = UnitQuaternion::new_unchecked(quaternion);
             assert_eq!(fuser.representative(&pose, &pose), pose);
@@ -274,9 +274,9 @@ fn a_pose_without_a_nearer_equivalent_does_not_change() {
         for exponent in 1..10 {
             let offset = 10_f64.powi(-exponent);
             for _ in 0..100 {
-                let mut reference = random.pose(1.0);
+                let mut reference = random.motion(1.0);
                 reference.translation.vector *= meters;
-                let mut pose = reference * random.pose(offset);
+                let mut pose = reference * random.motion(offset);
                 let quaternion = pose.rotation.into_inner() * (1.0 + 1e-15);
                 pose.rotation = UnitQuaternion::new_unchecked(quaternion);
                 let found = fuser.representative(&pose, &reference);

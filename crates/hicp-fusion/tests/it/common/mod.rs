@@ -1,33 +1,21 @@
 //! Random estimates, the same in every run.
 
+pub(crate) use crate::support::Numbers as Random;
+
 use hicp_core::{Isometry3, Matrix6, Point3, Vector6, se3};
 use hicp_fusion::{Fused, Fuser, FuserConfig, Fusion, FusionLimits, PoseEstimate, UnitCovariance};
-
-/// The SplitMix64 generator.
-pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
     /// Returns a number, uniform in −1…1.
     pub(crate) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    /// Returns a standard normal number (Box–Muller).
-    pub(crate) fn normal(&mut self) -> f64 {
-        let u = f64::midpoint(self.uniform(), 1.0).max(1e-300);
-        (-2.0 * u.ln()).sqrt() * (std::f64::consts::PI * self.uniform()).cos()
+        self.between(-1.0, 1.0)
     }
 
     pub(crate) fn twist(&mut self, size: f64) -> Vector6<f64> {
         Vector6::from_fn(|_, _| size * self.uniform())
     }
 
-    pub(crate) fn pose(&mut self, size: f64) -> Isometry3<f64> {
+    pub(crate) fn motion(&mut self, size: f64) -> Isometry3<f64> {
         se3::exp(&self.twist(size))
     }
 
@@ -39,7 +27,7 @@ impl Random {
 
     /// Returns estimates scattered around a pose.
     pub(crate) fn estimates(&mut self, count: usize, spread: f64) -> Vec<PoseEstimate> {
-        let center = self.pose(1.0);
+        let center = self.motion(1.0);
         (0..count)
             .map(|_| {
                 let pose = se3::exp(&self.twist(spread)) * center;
