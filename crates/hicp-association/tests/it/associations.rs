@@ -2,7 +2,8 @@
 
 // References are written like the definitions. Their cost does not matter, since tests are small.
 
-use crate::common::{Random, Scene, ball_scene, blind_scene, bumpy_ball, scene_of, squared};
+use crate::common::{Scene, ball_scene, blind_scene, bumpy_ball, scene_of, squared};
+use crate::support::Numbers;
 use hicp_association::{
     AllSamples, ClosestPointOnMesh, Contour, DataAssociation, KNearest, Length, NearestNeighbor,
     NormalCompatible, NormalShooting, ObservationToModel, Projective, ProjectiveInterpolated,
@@ -67,7 +68,7 @@ fn assert_well_formed(scene: &Scene, source: &[Surfel], pose: &Isometry3<f64>, p
 #[test]
 fn without_observed_points_there_are_no_pairs() {
     let blind = blind_scene();
-    let source = Random::new(3).surfels(20, 0.1);
+    let source = Numbers(3).surfels(20, 0.1);
     for mut association in all_associations() {
         let pairs = blind.associate(&mut association, &source, &blind.truth);
         assert!(pairs.is_empty(), "{}", association.name());
@@ -100,7 +101,7 @@ proptest! {
     #[test]
     fn a_search_from_the_last_pairs_equals_a_new_search(seed: u64, stride in 1_u32..6, spread in 0.0_f64..1.5) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
-        let mut source = Random::new(seed).surfels(40, 0.1);
+        let mut source = Numbers(seed).surfels(40, 0.1);
         source.extend(scene.select(&mut AllSamples, &scene.truth).iter().take(40));
         let targets = Stride::Pixels(stride);
         let mut warm = NearestNeighbor::new(targets, SearchIndex::BoxTree);
@@ -115,7 +116,7 @@ proptest! {
     #[test]
     fn the_k_nearest_are_found(seed: u64, k in 0_usize..12, stride in 1_u32..4) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
-        let source = Random::new(seed).surfels(25, 0.1);
+        let source = Numbers(seed).surfels(25, 0.1);
         let pose = scene.nearby(seed);
         let mut association = KNearest::new(k, Stride::Pixels(stride));
         let pairs = scene.associate(&mut association, &source, &pose);
@@ -135,7 +136,7 @@ proptest! {
     #[test]
     fn normal_compatible_selects_the_nearest_compatible_point(seed: u64, angle in 5.0_f32..120.0) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
-        let source = Random::new(seed).surfels(40, 0.08);
+        let source = Numbers(seed).surfels(40, 0.08);
         let pose = scene.nearby(seed);
         let pairs = scene.associate(&mut NormalCompatible::new(f64::from(angle), 8, ALL), &source, &pose);
         assert_well_formed(&scene, &source, &pose, pairs.as_slice());
@@ -152,7 +153,7 @@ proptest! {
     #[test]
     fn normal_shooting_selects_the_point_closest_to_the_line(seed: u64, offset in 0.0005_f32..0.02) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
-        let source = Random::new(seed).surfels(40, 0.08);
+        let source = Numbers(seed).surfels(40, 0.08);
         let pose = scene.nearby(seed);
         let limit = Some(Length::Meters(f64::from(offset)));
         let pairs = scene.associate(&mut NormalShooting::new(9, limit, ALL), &source, &pose);
@@ -177,7 +178,7 @@ proptest! {
     #[test]
     fn reciprocal_keeps_the_mutual_nearest(seed: u64) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
-        let mut source = Random::new(seed).surfels(60, 0.08);
+        let mut source = Numbers(seed).surfels(60, 0.08);
         // Two points at the same place have the same claim.
         source[7] = source[31];
         let pose = scene.nearby(seed);
@@ -197,7 +198,7 @@ proptest! {
     #[test]
     fn the_window_is_searched_in_three_dimensions(seed: u64, radius in 0_u32..5) {
         let scene = scene_of(bumpy_ball(0.08), 0.001, seed);
-        let source = Random::new(seed).surfels(60, 0.1);
+        let source = Numbers(seed).surfels(60, 0.1);
         let pose = scene.nearby(seed);
         let pairs = scene.associate(&mut ProjectiveSearch { radius }, &source, &pose);
         assert_well_formed(&scene, &source, &pose, pairs.as_slice());
@@ -249,7 +250,7 @@ proptest! {
 
     #[test]
     fn observed_points_pair_with_the_closest_point_of_the_mesh(seed: u64, visible_only: bool) {
-        let mut random = Random::new(seed);
+        let mut random = Numbers(seed);
         // A closed mesh, a closed one wound inward, and a soup of triangles with slivers and a
         // degenerate one.
         let closed = bumpy_ball(0.08);
@@ -344,13 +345,13 @@ fn interpolation_is_exact_on_a_plane() {
     let normal = UnitVector3::new_normalize(Vector3::new(0.5, -0.3, -1.0));
     let observation = observe(plane_depth(&normal, -0.5, &camera), camera);
     let scene = scene_with(observation);
-    let mut random = Random::new(9);
+    let mut random = Numbers(9);
     let source: Vec<Surfel> = (0..300)
         .map(|_| {
             let (u, v) = (2.0 + 58.0 * random.unit(), 2.0 + 43.0 * random.unit());
             Surfel {
-                point: camera.unproject(f64::from(u), f64::from(v), 0.4).cast(),
-                normal: random.direction(),
+                point: camera.unproject(u, v, 0.4).cast(),
+                ..random.surfel(0.0)
             }
         })
         .collect();
@@ -417,9 +418,9 @@ fn nothing_is_interpolated_across_an_edge() {
 fn the_order_of_the_points_does_not_change_the_pairs() {
     let scene = ball_scene();
     let pose = scene.nearby(4);
-    let source = Random::new(4).surfels(50, 0.08);
+    let source = Numbers(4).surfels(50, 0.08);
     let mut order: Vec<usize> = (0..50).collect();
-    Random::new(5).shuffle(&mut order);
+    Numbers(5).shuffle(&mut order);
     let shuffled: Vec<Surfel> = order.iter().map(|i| source[*i]).collect();
     for mut association in all_associations() {
         let pairs = scene.associate(&mut association, &source, &pose);

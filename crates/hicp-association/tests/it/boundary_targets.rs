@@ -1,12 +1,13 @@
 //! Tests of the filter of targets at the boundary of the observed surface.
 
-use crate::common::{Scene, ball_scene, box_mesh, scene_of};
+use crate::common::{Scene, ball_scene, scene_of};
+use crate::support::cuboid;
 use hicp_association::BoundaryTargets;
 use hicp_core::{DepthImage, Mask, Observation, Pair, PinholeCamera, Point3, Surfel, Vector3};
 
 #[test]
 fn boundary_targets_equal_their_definition() {
-    for scene in [ball_scene(), scene_of(box_mesh(0.03, 0.09, 0.05), 0.0, 8)] {
+    for scene in [ball_scene(), scene_of(cuboid(0.06, 0.18, 0.1), 0.0, 8)] {
         let (observation, region) = (&scene.observation, scene.observation.region());
         let pairs: Vec<Pair> = observation
             .surfels(1)

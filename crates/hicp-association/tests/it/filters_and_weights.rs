@@ -4,7 +4,8 @@
 
 use std::sync::OnceLock;
 
-use crate::common::{Random, Scene, ball_scene};
+use crate::common::{Scene, ball_scene};
+use crate::support::Numbers;
 use hicp_association::{
     BoundaryTargets, ConstantWeight, DistanceWeight, Length, MadDistance, MaxDistance,
     MaxNormalAngle, MedianDistance, MinPairs, NormalWeight, OneToOne, OutlierFilter, SensorNoise,
@@ -115,7 +116,7 @@ fn distances_that_are_not_finite_are_removed_and_ignored() {
 
 #[test]
 fn weights_stay_finite_and_not_negative() {
-    let mut random = Random::new(3);
+    let mut random = Numbers(3);
     let mut pairs: Vec<Pair> = (0..50)
         .map(|i| Pair::new(i, random.surfel(0.5), i % 7, random.surfel(0.5)))
         .collect();
@@ -204,7 +205,7 @@ proptest! {
 
     #[test]
     fn one_to_one_keeps_the_closest_of_every_target(d in distances(), seed: u64) {
-        let mut random = Random::new(seed);
+        let mut random = Numbers(seed);
         let mut pairs = pairs_at(&d);
         for pair in &mut pairs {
             pair.target_index = random.below(20) as u32;
@@ -237,7 +238,7 @@ proptest! {
     fn the_order_of_the_pairs_does_not_change_the_result(d in distances(), seed: u64) {
         let pairs = pairs_at(&d);
         let mut shuffled = pairs.clone();
-        Random::new(seed).shuffle(&mut shuffled);
+        Numbers(seed).shuffle(&mut shuffled);
         for mut filter in all_filters() {
             let plain = scene().filter(&mut filter, &pairs);
             let mut other = scene().filter(&mut filter, &shuffled);

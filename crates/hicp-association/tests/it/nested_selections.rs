@@ -5,7 +5,8 @@
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-use crate::common::{Fixed, Random, Scene, ball_scene, blind_scene, box_mesh, scene_of};
+use crate::common::{Fixed, Scene, ball_scene, blind_scene, scene_of};
+use crate::support::{Numbers, cuboid};
 use hicp_association::{
     AllSamples, Length, NormalSpace, ObservedSurface, PointSelection, RandomSample, StableSampling,
     Stride, UniformCount, VisibleSurface, VoxelGrid, WithoutBoundary,
@@ -53,7 +54,7 @@ fn impossible_poses_select_nothing_and_counts_may_be_zero() {
         }
     }
     for points in [0, 1, 2] {
-        let fixed = Fixed(Random::new(1).surfels(points, 0.1));
+        let fixed = Fixed(Numbers(1).surfels(points, 0.1));
         for count in [0, 1, 5] {
             let expected = points.min(count);
             let selection = fixed.clone();
@@ -78,7 +79,7 @@ fn impossible_poses_select_nothing_and_counts_may_be_zero() {
 
 #[test]
 fn points_that_are_not_finite_do_not_panic() {
-    let mut surfels = Random::new(2).surfels(40, 0.1);
+    let mut surfels = Numbers(2).surfels(40, 0.1);
     surfels[3].point.x = f32::NAN;
     surfels[7].point.z = f32::INFINITY;
     surfels[9].normal = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
@@ -95,7 +96,7 @@ fn points_that_are_not_finite_do_not_panic() {
 
 #[test]
 fn uniform_count_is_evenly_spaced() {
-    let fixed = Fixed(Random::new(3).surfels(10, 0.1));
+    let fixed = Fixed(Numbers(3).surfels(10, 0.1));
     let mut selection = UniformCount {
         selection: fixed.clone(),
         count: 4,
@@ -111,7 +112,7 @@ fn uniform_count_is_evenly_spaced() {
 
 #[test]
 fn random_samples_are_fair_and_follow_the_seed() {
-    let fixed = Fixed(Random::new(4).surfels(12, 0.1));
+    let fixed = Fixed(Numbers(4).surfels(12, 0.1));
     let mut drawn = [0_u32; 12];
     let mut pairs_drawn = 0;
     for seed in 0..2000 {
@@ -158,7 +159,7 @@ proptest! {
 
     #[test]
     fn voxel_grid_keeps_the_central_point_of_every_cell(seed: u64, cell in 0.005_f32..0.3) {
-        let mut random = Random::new(seed);
+        let mut random = Numbers(seed);
         let mut surfels = random.surfels(120, 0.1);
         let grid = |surfels: &[Surfel]| {
             select_fixed(&mut VoxelGrid::new(Fixed(surfels.to_vec()), Length::Meters(f64::from(cell))))
@@ -178,7 +179,7 @@ proptest! {
 
     #[test]
     fn normal_space_selects_equally_from_every_direction(seed: u64, count in 1_usize..150) {
-        let mut random = Random::new(seed);
+        let mut random = Numbers(seed);
         // Six directions of very different frequency, so that the buckets are known.
         let axes = [Vector3::x_axis(), -Vector3::x_axis(), Vector3::y_axis(), -Vector3::y_axis(),
             Vector3::z_axis(), -Vector3::z_axis()];
@@ -200,7 +201,7 @@ proptest! {
 
     #[test]
     fn stable_sampling_equals_its_definition(seed: u64, count in 1_usize..60) {
-        let surfels = Random::new(seed).surfels(60, 0.1);
+        let surfels = Numbers(seed).surfels(60, 0.1);
         let chosen = select_fixed(&mut StableSampling::new(Fixed(surfels.clone()), count));
         prop_assert_eq!(positions(&surfels, &chosen), stable_reference(&surfels, count));
     }
@@ -251,7 +252,7 @@ fn stable_reference(surfels: &[Surfel], count: usize) -> Vec<usize> {
 #[test]
 fn stable_sampling_finds_the_groove_of_a_plate() {
     // Only forty slanted points of a thousand keep this plate from sliding along x and y.
-    let mut random = Random::new(6);
+    let mut random = Numbers(6);
     let mut surfels: Vec<Surfel> = (0..1000)
         .map(|_| Surfel {
             point: Point3::new(random.within(0.1), random.within(0.1), 0.0),
@@ -301,7 +302,7 @@ fn observed_surface_lies_at_the_observed_points() {
 
 #[test]
 fn without_boundary_equals_its_definition() {
-    for scene in [ball_scene(), scene_of(box_mesh(0.03, 0.09, 0.05), 0.0, 8)] {
+    for scene in [ball_scene(), scene_of(cuboid(0.06, 0.18, 0.1), 0.0, 8)] {
         let pose = scene.nearby(3);
         let stride = Stride::Pixels(1);
         let all = scene.select(&mut VisibleSurface::with_stride(stride), &pose);
@@ -334,7 +335,7 @@ fn boundary_reference(
     width: u32,
     max_step: f32,
 ) -> Vec<Surfel> {
-    let mut renders = RenderCache::new(crate::common::RayCaster);
+    let mut renders = RenderCache::new(crate::support::RayCaster);
     let mut context = Context::new(scene.problem(), &mut renders);
     let view = context.view(pose).unwrap();
     let depth = |u: i64, v: i64| view.depth_at(u as u32, v as u32);

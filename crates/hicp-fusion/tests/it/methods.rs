@@ -31,22 +31,6 @@ fn names_parse_to_their_methods() {
 }
 
 #[test]
-fn the_first_estimate_is_returned_unchanged() {
-    let mut random = Random(11);
-    let first = random.estimates(1, 0.2)[0].with_mve(0.3).unwrap();
-    for method in FusionMethod::ALL {
-        let mut fuser = method.build(exact());
-        assert_eq!(fuser.estimate(), None);
-        fuser.propagate(&CameraMotion::none());
-        assert_eq!(fuser.estimate(), None);
-        fuser.update(&first);
-        assert_eq!(fuser.estimate(), Some(first), "{method}");
-        fuser.reset();
-        assert_eq!(fuser.estimate(), None);
-    }
-}
-
-#[test]
 fn last_estimate_is_the_last() {
     let estimates = Random(12).estimates(4, 0.2);
     let last = run(&mut LastEstimate::new(Transport::Adjoint), &estimates);

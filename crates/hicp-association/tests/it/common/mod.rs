@@ -1,53 +1,27 @@
 //! Scenes for the tests of this crate: small meshes, a ray-casting renderer, and observations.
 
+use crate::support::{Numbers, RayCaster, render_depth};
 use hicp_association::{DataAssociation, OutlierFilter, PointSelection};
 use hicp_core::Iteration;
 use hicp_core::{
     Context, Correspondences, DepthImage, Isometry3, Mask, Model, ModelConfig, Observation, Pair,
-    PinholeCamera, PixelRegion, Point3, Problem, RenderCache, RenderedView, Renderer, Surfel,
-    Translation3, TriMesh, UnitQuaternion, UnitVector3, Vector3,
+    PinholeCamera, Point3, Problem, RenderCache, Surfel, Translation3, TriMesh, UnitQuaternion,
+    UnitVector3,
 };
 
-/// A seeded generator (xorshift64*), so that a failing case can be repeated.
-pub struct Random(u64);
-
-impl Random {
-    pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(2).wrapping_add(0x9e37_79b9_7f4a_7c15) | 1)
-    }
-
-    /// Returns a number in 0 … 1.
-    pub fn unit(&mut self) -> f32 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 40) as f32 / (1_u64 << 24) as f32
-    }
-
+impl Numbers {
     pub fn within(&mut self, half: f32) -> f32 {
-        (2.0 * self.unit() - 1.0) * half
-    }
-
-    pub fn below(&mut self, n: usize) -> usize {
-        ((self.unit() * n as f32) as usize).min(n - 1)
+        self.between(-1.0, 1.0) as f32 * half
     }
 
     pub fn point(&mut self, half: f32) -> Point3<f32> {
         Point3::new(self.within(half), self.within(half), self.within(half))
     }
 
-    pub fn direction(&mut self) -> UnitVector3<f32> {
-        loop {
-            if let Some(unit) = UnitVector3::try_new(self.point(1.0).coords, 0.1) {
-                return unit;
-            }
-        }
-    }
-
     pub fn surfel(&mut self, half: f32) -> Surfel {
         Surfel {
             point: self.point(half),
-            normal: self.direction(),
+            normal: UnitVector3::new_unchecked(self.direction().cast()),
         }
     }
 
@@ -73,29 +47,6 @@ impl Random {
 
 pub fn camera() -> PinholeCamera {
     PinholeCamera::new(90.0, 95.0, 31.2, 23.9, 64, 48).unwrap()
-}
-
-/// A box with the given half sides in meters, wound outward.
-pub fn box_mesh(x: f32, y: f32, z: f32) -> TriMesh {
-    let vertices = (0..8)
-        .map(|i| {
-            let side = |bit: u32, half: f32| if i >> bit & 1 == 1 { half } else { -half };
-            Point3::new(side(0, x), side(1, y), side(2, z))
-        })
-        .collect();
-    let quads = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
-        .collect();
-    TriMesh::new(vertices, triangles).unwrap()
 }
 
 /// A bumpy ball of about 400 triangles, wound outward, in meters.
@@ -131,47 +82,6 @@ pub fn bumpy_ball(radius: f32) -> TriMesh {
     TriMesh::new(vertices, triangles).unwrap()
 }
 
-/// A renderer that intersects the ray of every pixel with every triangle.
-pub struct RayCaster;
-
-impl Renderer for RayCaster {
-    fn render(
-        &mut self,
-        mesh: &TriMesh,
-        camera: &PinholeCamera,
-        camera_from_object: &Isometry3<f64>,
-        region: &PixelRegion,
-        view: &mut RenderedView,
-    ) {
-        view.reset(*region);
-        let corners: Vec<[Vector3<f64>; 3]> = (0..mesh.triangles().len())
-            .map(|t| {
-                mesh.corners(t)
-                    .map(|p| (camera_from_object * p.cast()).coords)
-            })
-            .collect();
-        let width = region.width();
-        let (depth, triangles) = view.buffers_mut();
-        for index in 0..depth.len() {
-            let (u, v) = (index % width, index / width);
-            let ray = camera.unproject(u as f64, v as f64, 1.0).coords;
-            for (triangle, [a, b, c]) in (0_u32..).zip(&corners) {
-                let (ab, ac) = (b - a, c - a);
-                let normal = ab.cross(&ac);
-                let z = normal.dot(a) / normal.dot(&ray);
-                let hit = ray * z - a;
-                let s = hit.cross(&ac).dot(&normal) / normal.norm_squared();
-                let t = ab.cross(&hit).dot(&normal) / normal.norm_squared();
-                let nearer = depth[index] == 0.0 || (z as f32) < depth[index];
-                if z > 0.01 && s >= 0.0 && t >= 0.0 && s + t <= 1.0 && nearer {
-                    depth[index] = z as f32;
-                    triangles[index] = triangle;
-                }
-            }
-        }
-    }
-}
-
 /// A model, its observation, and its true pose.
 pub struct Scene {
     pub model: Model,
@@ -186,7 +96,7 @@ impl Scene {
 
     /// Returns a pose near the true one.
     pub fn nearby(&self, seed: u64) -> Isometry3<f64> {
-        let offset = Random::new(seed).motion(0.1, 0.01);
+        let offset = Numbers(seed).motion(0.1, 0.01);
         self.truth * offset
     }
 
@@ -241,35 +151,25 @@ impl Scene {
 
 /// A mesh at a distance of 0.5 m, observed by the ray caster with some depth noise.
 pub fn scene_of(mesh: TriMesh, noise: f32, seed: u64) -> Scene {
-    let mut random = Random::new(seed);
-    let truth = Isometry3::translation(0.01, -0.02, 0.5) * random.motion(1.5, 0.0);
-    let camera = camera();
-    let mut view = RenderedView::default();
-    RayCaster.render(&mesh, &camera, &truth, &camera.region(), &mut view);
-    let mask = view.depth().iter().map(|z| *z > 0.0).collect();
-    let depth = view
-        .depth()
-        .iter()
-        .map(|z| {
-            if *z > 0.0 {
-                z + random.within(noise)
-            } else {
-                0.9
-            }
-        })
-        .collect();
+    let mut numbers = Numbers(seed);
+    let truth = Isometry3::translation(0.01, -0.02, 0.5) * numbers.motion(1.5, 0.0);
     let config = ModelConfig {
         samples: 400,
         ..ModelConfig::default()
     };
+    let model = Model::with_config(mesh, config);
+    let exact = render_depth(&model, &camera(), &truth);
+    let noisy = exact.pixels().iter().map(|z| {
+        if *z > 0.0 {
+            z + numbers.within(noise)
+        } else {
+            0.9
+        }
+    });
+    let noisy = DepthImage::collect(64, 48, noisy).unwrap();
     Scene {
-        model: Model::with_config(mesh, config),
-        observation: Observation::new(
-            DepthImage::from_meters(64, 48, depth).unwrap(),
-            Mask::new(64, 48, mask).unwrap(),
-            camera,
-        )
-        .unwrap(),
+        observation: Observation::new(noisy, Mask::measured(&exact), camera()).unwrap(),
+        model,
         truth,
     }
 }
