@@ -228,7 +228,14 @@ fn images_that_cannot_be_shown_are_refused() {
         &["in.csv has no row of image 40 of scene 3"],
     );
     write(ResultRow::new(3, 40, ABSENT, pose));
-    fails("--results in.csv", &["nothing to show", "no model"]);
+    fails(
+        "--results in.csv",
+        &[
+            "nothing to show",
+            "no model for object 9, expected",
+            "obj_000009.ply",
+        ],
+    );
     fails("--results gone.csv", &["cannot read gone.csv"]);
     fails(
         "--results off.csv --split tset",

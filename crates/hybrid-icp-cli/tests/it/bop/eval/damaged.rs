@@ -49,7 +49,8 @@ fn rows_and_targets_that_do_not_match_are_warned_of() {
     world.write("asked.json", targets.to_string());
     write_results(world.path("in.csv"), &truth_as_results(&world)).unwrap();
     let run = eval(&world, "--targets asked.json").warns(&[
-        "no model for object 9",
+        "no model for object 9, expected",
+        "obj_000009.ply",
         "scene_gt.json",
         "2 instances of object 1, but the targets request 3",
         "8 of 10 rows have no target",
