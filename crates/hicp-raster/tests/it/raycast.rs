@@ -1,39 +1,38 @@
 //! Tests of the rasterizer against an independent ray caster.
 
 use crate::common::*;
-use hicp_core::{Isometry3, PinholeCamera, PixelCenters, Point3};
+use hicp_core::{Isometry3, PinholeCamera, PixelCenters, Point3, TriMesh};
 use hicp_raster::Culling;
 use proptest::prelude::*;
+
+/// Checks the rendering of a mesh.
+fn check(mesh: &TriMesh, pose: &Isometry3<f64>) {
+    let camera = camera();
+    let view = render(Culling::Auto, mesh, &camera, pose);
+    assert_agrees(&view, mesh, &camera, pose, 1e-4);
+}
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
     fn a_soup_in_front_of_the_camera(mesh in soup(), pose in pose(0.4..1.5)) {
-        let camera = camera();
-        let view = render(Culling::Auto, &mesh, &camera, &pose);
-        assert_agrees(&view, &mesh, &camera, &pose, 1e-4);
+        check(&mesh, &pose);
     }
 
     #[test]
     fn a_soup_around_the_camera(mesh in soup(), pose in pose(-0.2..0.3)) {
-        let camera = camera();
-        let view = render(Culling::Auto, &mesh, &camera, &pose);
-        assert_agrees(&view, &mesh, &camera, &pose, 1e-4);
+        check(&mesh, &pose);
     }
 
     #[test]
     fn a_closed_mesh_in_front_of_the_camera(mesh in closed_mesh(), pose in pose(0.25..1.5)) {
-        let camera = camera();
-        let view = render(Culling::Auto, &mesh, &camera, &pose);
-        assert_agrees(&view, &mesh, &camera, &pose, 1e-4);
+        check(&mesh, &pose);
     }
 
     #[test]
     fn a_closed_mesh_around_the_camera(mesh in closed_mesh(), pose in pose(-0.1..0.15)) {
-        let camera = camera();
-        let view = render(Culling::Auto, &mesh, &camera, &pose);
-        assert_agrees(&view, &mesh, &camera, &pose, 1e-4);
+        check(&mesh, &pose);
     }
 
     /// Away from surfaces that are nearly edge-on, depth is accurate to its `f32`.
@@ -65,7 +64,7 @@ proptest! {
             }
             let index = view.region().index(u, v).unwrap();
             let alone = mesh.corners(view.triangles()[index] as usize);
-            let alone = hicp_core::TriMesh::new(alone.to_vec(), vec![[0, 1, 2]]).unwrap();
+            let alone = TriMesh::new(alone.to_vec(), vec![[0, 1, 2]]).unwrap();
             let cast = cast(&alone, &camera, &pose, u, v).unwrap();
             prop_assert!((f64::from(depth) - cast).abs() <= 1e-4 * cast);
         }
@@ -86,7 +85,7 @@ fn pixel_centers_at_halves_shift_by_half_a_pixel() {
     let camera = PinholeCamera::with_pixel_centers(halves, 40.0, 40.0, 16.0, 16.0, 32, 32).unwrap();
     // A slanted plane z = 1 + x/2 + y/4, large enough to fill the image.
     let corner = |x: f32, y: f32| Point3::new(x, y, 1.0 + x / 2.0 + y / 4.0);
-    let mesh = hicp_core::TriMesh::new(
+    let mesh = TriMesh::new(
         vec![corner(-1.2, -1.2), corner(4.0, -1.2), corner(-1.2, 4.0)],
         vec![[0, 1, 2]],
     )

@@ -1,7 +1,6 @@
 //! Helpers that create pairs.
 
-pub(crate) use crate::support;
-
+use crate::support::Numbers;
 use hicp_core::{Correspondences, Isometry3, Pair, Point3, Surfel, UnitVector3, Vector3};
 
 pub fn pair(p: Point3<f64>, q: Point3<f64>, normal: Vector3<f64>, weight: f32) -> Pair {
@@ -17,6 +16,24 @@ pub fn pair(p: Point3<f64>, q: Point3<f64>, normal: Vector3<f64>, weight: f32) -
         source_index: 0,
         target_index: 0,
     }
+}
+
+/// Returns fewer than `most` pairs at extreme scales, half of them on a line.
+pub fn extreme(numbers: &mut Numbers, most: usize) -> Correspondences {
+    let scales = [0.0, 1e-38, 1e-20, 1e-6, 1.0, 1e6, 1e18, 3e38];
+    let line = numbers.direction();
+    (0..numbers.below(most))
+        .map(|i| {
+            let [p, q] = [(); 2].map(|()| {
+                let scale = scales[numbers.below(scales.len())];
+                let p = if i % 2 == 0 { numbers.vector() } else { line };
+                Point3::from(p.map(|x| x.clamp(-1.0, 1.0) * scale))
+            });
+            let known = f64::from(u8::from(numbers.below(4) > 0));
+            let normal = numbers.direction() * known;
+            pair(p, q, normal, numbers.below(3) as f32)
+        })
+        .collect()
 }
 
 /// Returns pairs of points and their images under a motion, both rounded to f32.
@@ -61,7 +78,7 @@ pub fn determinant(motion: &Isometry3<f64>) -> f64 {
 
 /// Returns pairs on an ellipsoid of 10 cm, with sources displaced by a motion around its center.
 pub fn ellipsoid(
-    numbers: &mut support::Numbers,
+    numbers: &mut Numbers,
     count: usize,
     off: &Isometry3<f64>,
     center: &Vector3<f64>,
@@ -82,7 +99,7 @@ pub fn ellipsoid(
         .collect()
 }
 
-pub fn small_motion(numbers: &mut support::Numbers, degrees: f64, shift: f64) -> Isometry3<f64> {
+pub fn small_motion(numbers: &mut Numbers, degrees: f64, shift: f64) -> Isometry3<f64> {
     let axis = numbers.direction() * degrees.to_radians();
     Isometry3::new(numbers.direction() * shift, axis)
 }
