@@ -18,7 +18,7 @@ use hicp_sim::{
     CaseConfig, CaseMaker, Corruption, DepthSensor, Household, InitialPose, SimRng, stream,
 };
 use hicp_tests::mugs::public_mugs;
-use hicp_tests::tabletop::{MaskKind, Tabletop};
+use hicp_tests::tabletop::{self, MaskKind, Tabletop};
 use hicp_tests::{camera, household, mean, median};
 use hybrid_icp::core::{Isometry3, Model, Observation, Point3, Problem, Vector3, rotation_grid};
 use hybrid_icp::icp::{BoxedStage, Cascade, SearchOptions, Session, Stage, Workspace};
@@ -46,7 +46,24 @@ struct Seen<'a> {
     near: Isometry3<f64>,
 }
 
-impl Seen<'_> {
+impl<'a> Seen<'a> {
+    fn new(
+        name: &'a str,
+        model: &'a Model,
+        seen: &tabletop::Seen,
+        kind: MaskKind,
+        random: &mut SimRng,
+    ) -> Result<Self, Box<dyn std::error::Error>> {
+        Ok(Self {
+            name,
+            model,
+            observation: seen.observe(kind)?,
+            truth: seen.truth,
+            turned: seen.turned(random, model, model),
+            near: seen.near(random, 1.0),
+        })
+    }
+
     fn error(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
         let points: Vec<Point3<f32>> = self.model.samples().iter().map(|s| s.point).collect();
         let symmetries = self.model.symmetries().motions();
@@ -335,14 +352,7 @@ fn each_case(
     for seed in seeds {
         for seen in table.scene(seed)? {
             let (name, model) = &table.objects[seen.model];
-            visit(&Seen {
-                name,
-                model,
-                observation: seen.observe(kind)?,
-                truth: seen.truth,
-                turned: seen.turned(random, model, model),
-                near: seen.near(random, 1.0),
-            });
+            visit(&Seen::new(name, model, &seen, kind, random)?);
         }
     }
     Ok(())
@@ -372,7 +382,7 @@ fn handles(
                 ..Corruption::default()
             };
             let (depth, visible) = corruption.apply(&case)?;
-            let seen = hicp_tests::tabletop::Seen {
+            let seen = tabletop::Seen {
                 model: 0,
                 truth: case.camera_from_object,
                 depth: depth.into(),
@@ -381,14 +391,7 @@ fn handles(
                 sensor: DepthSensor::default(),
                 camera: camera(),
             };
-            visit(&Seen {
-                name,
-                model,
-                observation: seen.observe(kind)?,
-                truth: seen.truth,
-                turned: seen.turned(random, model, model),
-                near: seen.near(random, 1.0),
-            });
+            visit(&Seen::new(name, model, &seen, kind, random)?);
         }
     }
     Ok(())

@@ -6,10 +6,10 @@ use std::ops::ControlFlow;
 use hicp_sim::{Household, perturb, rng};
 use hicp_tests::starts::{Start, starts};
 use hicp_tests::{OBJECTS, median, scene, symmetric_pose_distance};
-use hybrid_icp::association::{NearestNeighbor, Projective, VisibleSurface};
+use hybrid_icp::association::{DataAssociation, NearestNeighbor, Projective, VisibleSurface};
 use hybrid_icp::core::Isometry3;
 use hybrid_icp::icp::{Icp, IterationEvent, IterationLimit, Observer, Regime, RegimeEvent};
-use hybrid_icp::metric::{PointToPlane, PointToPoint, Symmetric};
+use hybrid_icp::metric::{Minimize, PointToPlane, PointToPoint, Symmetric};
 use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refiner, presets};
 
@@ -40,51 +40,32 @@ impl Observer for Path {
 const ITERATIONS: usize = 26;
 
 pub(crate) fn convergence() -> Drawn {
-    let (selection, filter) = (VisibleSurface::default(), ());
-    let stop = IterationLimit(ITERATIONS);
-    let association = NearestNeighbor::default();
-    let nearest = Icp {
-        selection,
-        association,
-        filter,
-        metric: PointToPoint,
-        stop,
-    };
-    let association = Projective;
-    let to_point = Icp {
-        selection,
-        association,
-        filter,
-        metric: PointToPoint,
-        stop,
-    };
-    let to_plane = Icp {
-        selection,
-        association,
-        filter,
-        metric: PointToPlane,
-        stop,
-    };
-    let symmetric = Icp {
-        selection,
-        association,
-        filter,
-        metric: Symmetric,
-        stop,
-    };
+    fn icp(
+        association: impl DataAssociation + Send + 'static,
+        metric: impl Minimize + Send + 'static,
+    ) -> Refiner {
+        Refiner::boxed(Icp {
+            selection: VisibleSurface::default(),
+            association,
+            filter: (),
+            metric,
+            stop: IterationLimit(ITERATIONS),
+        })
+    }
+    let nearest = icp(NearestNeighbor::default(), PointToPoint);
     let mut stages: [(&str, &'static str, Refiner); 4] = [
-        ("nearest, point-to-point", BAD, Refiner::boxed(nearest)),
+        ("nearest, point-to-point", BAD, nearest),
         (
             "projective, point-to-point",
             BEFORE,
-            Refiner::boxed(to_point),
+            icp(Projective, PointToPoint),
         ),
         (
             "projective, point-to-plane",
             AFTER,
-            Refiner::boxed(to_plane),
+            icp(Projective, PointToPlane),
         ),
-        ("projective, symmetric", GOOD, Refiner::boxed(symmetric)),
+        ("projective, symmetric", GOOD, icp(Projective, Symmetric)),
     ];
     let starts = starts(4, 0.0);
     let mut lines = Vec::new();

@@ -1,45 +1,26 @@
 //! Unusual and invalid PNG files: each is read correctly or refused with a clear error.
 
+use std::io::Write;
+
+use flate2::{Crc, write::ZlibEncoder};
 use hicp_io::{IoErrorKind, read_color, read_depth_png, read_mask_png, write_depth_png};
 use png::{BitDepth, ColorType, Compression, Encoder};
 
 use crate::common::{Folder, limits, message, refused};
 
-fn crc32(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
-            (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg())
-        })
-    })
-}
-
 fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
     let body = [&kind[..], data].concat();
-    [
-        &u32::try_from(data.len()).unwrap().to_be_bytes()[..],
-        &body,
-        &crc32(&body).to_be_bytes(),
-    ]
-    .concat()
+    let mut crc = Crc::new();
+    crc.update(&body);
+    let length = u32::try_from(data.len()).unwrap();
+    [&length.to_be_bytes()[..], &body, &crc.sum().to_be_bytes()].concat()
 }
 
 /// Returns rows as stored blocks of a zlib stream.
 fn stored(rows: &[u8]) -> Vec<u8> {
-    let mut data = vec![0x78, 1];
-    let mut blocks = rows.chunks(65_535).peekable();
-    while let Some(block) = blocks.next() {
-        let length = u16::try_from(block.len()).unwrap();
-        data.push(u8::from(blocks.peek().is_none()));
-        data.extend(length.to_le_bytes());
-        data.extend((!length).to_le_bytes());
-        data.extend(block);
-    }
-    let (a, b) = rows.iter().fold((1_u32, 0_u32), |(a, b), byte| {
-        let a = (a + u32::from(*byte)) % 65_521;
-        (a, (b + a) % 65_521)
-    });
-    data.extend(((b << 16) | a).to_be_bytes());
-    data
+    let mut stream = ZlibEncoder::new(Vec::new(), flate2::Compression::none());
+    stream.write_all(rows).unwrap();
+    stream.finish().unwrap()
 }
 
 /// Returns a PNG file of 16-bit gray with a custom header.

@@ -7,7 +7,6 @@
     reason = "helpers of tests"
 )]
 
-mod any_bytes;
 mod awkward_files;
 #[cfg(feature = "all-formats")]
 mod camera_pose_formats;

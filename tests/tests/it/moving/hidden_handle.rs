@@ -10,9 +10,9 @@ use hybrid_icp::fusion::{CameraMotion, FusionMethod};
 use hybrid_icp::score::mssd;
 use hybrid_icp::{Calibration, Preset, SequentialEstimator, TrackState, Tracker, TrackerConfig};
 
-const SECONDS: f64 = 1.0 / 30.0;
+pub(super) const SECONDS: f64 = 1.0 / 30.0;
 
-fn camera() -> PinholeCamera {
+pub(super) fn camera() -> PinholeCamera {
     PinholeCamera::new(285.0, 285.0, 159.5, 119.5, 320, 240).unwrap()
 }
 

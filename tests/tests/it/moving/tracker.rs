@@ -13,13 +13,7 @@ use hybrid_icp::core::{
 use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refiner, TrackState, Tracked, Tracker, TrackerConfig};
 
-use super::hidden_handle::handle_behind;
-
-const SECONDS: f64 = 1.0 / 30.0;
-
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(285.0, 285.0, 159.5, 119.5, 320, 240).unwrap()
-}
+use super::hidden_handle::{SECONDS, camera, handle_behind};
 
 struct Sequence {
     model: Model,
