@@ -1,6 +1,8 @@
 //! Tests of nearest neighbors against brute force (pitfall 26).
 
-use crate::support::{Numbers, RayCaster, cuboid, depth_image, observe_depth, sphere_depth};
+use crate::support::{
+    Numbers, RayCaster, camera, cuboid, depth_image, observe_depth, sphere_depth,
+};
 use hicp_association::{DataAssociation, NearestNeighbor, PointSearch, SearchIndex, Stride};
 use hicp_core::{
     Cloud, Context, Correspondences, DepthImage, Isometry3, Mask, Model, Observation,
@@ -18,10 +20,6 @@ fn nearest_neighbors(targets: Stride) -> impl Iterator<Item = NearestNeighbor> {
     INDEXES.iter().map(new)
 }
 
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
-}
-
 fn surfels(numbers: &mut Numbers, count: usize, scale: f64) -> Vec<Surfel> {
     (0..count)
         .map(|_| Surfel {
@@ -31,7 +29,7 @@ fn surfels(numbers: &mut Numbers, count: usize, scale: f64) -> Vec<Surfel> {
         .collect()
 }
 
-fn associate(
+pub fn associate(
     association: &mut dyn DataAssociation,
     observation: &Observation,
     source: &[Surfel],

@@ -1,30 +1,14 @@
 //! Tests of projective association against its definition (pitfall 22).
 
+use crate::nearest_neighbor::associate;
 use crate::support::{
-    Numbers, RayCaster, cuboid, depth_image, observe, observe_depth, pose, wedge,
+    Numbers, RayCaster, camera, depth_image, observe, observe_depth, pose, wedge,
 };
 use hicp_association::{DataAssociation, PointSelection, Projective, Stride, VisibleSurface};
 use hicp_core::{
-    Context, Correspondences, Isometry3, Model, Observation, PinholeCamera, Point3, Problem,
-    RenderCache, Surfel, UnitVector3, Vector3,
+    Context, Correspondences, Isometry3, Model, Point3, Problem, RenderCache, Surfel, UnitVector3,
+    Vector3,
 };
-
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
-}
-
-fn associate(
-    observation: &Observation,
-    source: &[Surfel],
-    pose: &Isometry3<f64>,
-) -> Correspondences {
-    let model = Model::new(cuboid(0.1, 0.1, 0.1));
-    let mut renders = RenderCache::new(RayCaster);
-    let mut context = Context::new(Problem::new(&model, observation), &mut renders);
-    let mut pairs = Correspondences::new();
-    Projective.associate(&mut context, source, pose, &mut pairs);
-    pairs
-}
 
 fn surfel(point: Point3<f32>) -> Surfel {
     Surfel {
@@ -51,7 +35,7 @@ fn pitfall_22_every_point_is_paired_with_the_pixel_it_projects_to() {
         let source: Vec<Surfel> = (0..200)
             .map(|_| surfel(Point3::from((numbers.vector() * 0.3).cast::<f32>())))
             .collect();
-        let pairs = associate(&observation, &source, &pose);
+        let pairs = associate(&mut Projective, &observation, &source, &pose);
         let mut found = pairs.as_slice().iter().peekable();
         for (index, surfel) in (0_u32..).zip(&source) {
             let here = found.next_if(|p| p.source_index == index);
@@ -95,7 +79,13 @@ fn pitfall_22_points_behind_the_camera_or_not_finite_have_no_pair() {
     let observation = observe_depth(depth_image(&camera(), |_| 0.5), &camera());
     let front = Point3::new(0.01, 0.02, 0.5);
     assert_eq!(
-        associate(&observation, &[surfel(front)], &Isometry3::identity()).len(),
+        associate(
+            &mut Projective,
+            &observation,
+            &[surfel(front)],
+            &Isometry3::identity()
+        )
+        .len(),
         1
     );
     for z in [
@@ -109,25 +99,40 @@ fn pitfall_22_points_behind_the_camera_or_not_finite_have_no_pair() {
     ] {
         let bad = surfel(Point3::new(0.01, 0.02, z));
         assert!(
-            associate(&observation, &[bad], &Isometry3::identity()).is_empty(),
+            associate(
+                &mut Projective,
+                &observation,
+                &[bad],
+                &Isometry3::identity()
+            )
+            .is_empty(),
             "z = {z}"
         );
     }
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
         for point in [Point3::new(bad, 0.0, 0.5), Point3::new(0.0, bad, 0.5)] {
-            assert!(associate(&observation, &[surfel(point)], &Isometry3::identity()).is_empty());
+            assert!(
+                associate(
+                    &mut Projective,
+                    &observation,
+                    &[surfel(point)],
+                    &Isometry3::identity()
+                )
+                .is_empty()
+            );
         }
     }
     // A pose that is finite in f64 but not in f32 moves every point to infinity.
     for far in [1e39, 1e300, f64::MAX] {
         let pose = Isometry3::translation(0.0, 0.0, far);
         assert!(
-            associate(&observation, &[surfel(front)], &pose).is_empty(),
+            associate(&mut Projective, &observation, &[surfel(front)], &pose).is_empty(),
             "{far}"
         );
     }
     assert!(
         associate(
+            &mut Projective,
             &observation,
             &[surfel(front)],
             &pose(0.0, 0.0, 0.0, 0.0, 4.0, 0.0)

@@ -1,15 +1,10 @@
 //! Tests of point selections: the pixels and normals of the visible surface, and all samples.
 
-use crate::support::{Numbers, RayCaster, cuboid, observe, pose, render_depth, wedge};
+use crate::support::{Numbers, RayCaster, camera, cuboid, observe, pose, render_depth, wedge};
 use hicp_association::{AllSamples, PointSelection, Stride, VisibleSurface};
 use hicp_core::{
-    Context, Isometry3, Model, ModelConfig, Observation, PinholeCamera, Problem, RenderCache,
-    Surfel, TriMesh,
+    Context, Isometry3, Model, ModelConfig, Observation, Problem, RenderCache, Surfel, TriMesh,
 };
-
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
-}
 
 fn select(
     selection: &mut dyn PointSelection,

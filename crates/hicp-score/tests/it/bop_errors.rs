@@ -4,19 +4,16 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::support::{Numbers, RayCaster, cuboid, pose, render_depth, wedge};
+use crate::pose_error::{corners, golden_poses, rotation};
+use crate::support::{Numbers, RayCaster, camera, cuboid, pose, render_depth, wedge};
 use hicp_core::{
     DepthImage, Isometry3, Model, ModelConfig, PinholeCamera, Point3, RenderedView, Renderer,
-    Symmetries, SymmetryAxis, TriMesh, UnitQuaternion, Vector3,
+    Symmetries, SymmetryAxis, TriMesh, Vector3,
 };
 use hicp_score::{
     ModelPoints, ScoreError, VISIBILITY_TOLERANCE_METERS, add, adi, bop_vsd, mspd, mssd,
     spheres_overlap, visibility_masks, vsd,
 };
-
-fn rotation(axis: Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::new(axis * angle)
-}
 
 fn half_turn() -> Isometry3<f64> {
     Isometry3::from_parts(Vector3::zeros().into(), rotation(Vector3::z(), PI))
@@ -24,16 +21,8 @@ fn half_turn() -> Isometry3<f64> {
 
 #[test]
 fn the_golden_case() {
-    let corners: Vec<Point3<f32>> = (0..8_u8)
-        .map(|i| {
-            let side = |bit: u8, half: f32| if i >> bit & 1 == 1 { half } else { -half };
-            Point3::new(side(0, 20.0), side(1, 30.0), side(2, 40.0))
-        })
-        .collect();
-    let turn = rotation(Vector3::z(), 0.3);
-    let truth = Isometry3::from_parts(Vector3::new(10.0, -5.0, 600.0).into(), turn);
-    let tilt = rotation(Vector3::x(), 0.2) * turn;
-    let estimate = Isometry3::from_parts(Vector3::new(12.0, -4.0, 605.0).into(), tilt);
+    let corners = corners();
+    let [truth, estimate] = golden_poses();
     let camera = PinholeCamera::new(572.4114, 573.57043, 325.2611, 242.04899, 640, 480).unwrap();
     let found = mssd(&estimate, &truth, &corners, &[]);
     assert!((found - 15.251_303_772_020_26).abs() < 1e-11, "{found}");
@@ -46,10 +35,6 @@ fn the_golden_case() {
     assert!((found - 72.111_025_509_279_78).abs() < 1e-11, "{found}");
     assert!(mssd(&flipped, &truth, &corners, &[half_turn()]) < 2e-14);
     assert!(mspd(&flipped, &truth, &corners, &[half_turn()], &camera) < 1e-12);
-}
-
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
 }
 
 /// Returns two poses in front of the camera, near each other.

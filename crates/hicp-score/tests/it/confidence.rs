@@ -1,27 +1,9 @@
 //! Tests of the misfit and the confidence against scenes with known differences.
 
-use crate::support::{RayCaster, cuboid, pose, render_depth};
-use hicp_core::{
-    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
-};
+use crate::evidence::{HEIGHT, WALL, WIDTH, at, camera, cube};
+use crate::support::{RayCaster, cuboid, render_depth};
+use hicp_core::{Context, DepthImage, Isometry3, Mask, Model, Observation, Problem, RenderCache};
 use hicp_score::{Confidence, Evidence, MeanVsd, Misfit, N_FEATURES, Score};
-
-const WIDTH: u32 = 64;
-const HEIGHT: u32 = 64;
-/// Depth of the wall behind the object, meters.
-const WALL: f32 = 0.6;
-
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(80.0, 80.0, 31.6, 30.3, WIDTH, HEIGHT).unwrap()
-}
-
-fn cube() -> Model {
-    Model::new(cuboid(0.08, 0.08, 0.08))
-}
-
-fn at() -> Isometry3<f64> {
-    pose(0.003, -0.002, 0.3, 0.4, 0.8, 0.2)
-}
 
 /// Returns the cube at [`at`] in front of a wall, with depths changed by pixel.
 fn scene(change: impl Fn(usize, f32) -> f32) -> Observation {

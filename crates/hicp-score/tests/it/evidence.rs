@@ -7,20 +7,20 @@ use hicp_core::{
 use hicp_score::Evidence;
 
 /// A grid of this width has all pixels.
-const WIDTH: u32 = 64;
-const HEIGHT: u32 = 64;
+pub(crate) const WIDTH: u32 = 64;
+pub(crate) const HEIGHT: u32 = 64;
 /// Depth of the wall behind the object, meters.
-const WALL: f32 = 0.6;
+pub(crate) const WALL: f32 = 0.6;
 
-fn camera() -> PinholeCamera {
+pub(crate) fn camera() -> PinholeCamera {
     PinholeCamera::new(80.0, 80.0, 31.6, 30.3, WIDTH, HEIGHT).unwrap()
 }
 
-fn cube() -> Model {
+pub(crate) fn cube() -> Model {
     Model::new(cuboid(0.08, 0.08, 0.08))
 }
 
-fn at() -> Isometry3<f64> {
+pub(crate) fn at() -> Isometry3<f64> {
     pose(0.003, -0.002, 0.3, 0.4, 0.8, 0.2)
 }
 
@@ -50,7 +50,7 @@ fn evidence(depth: impl Fn(usize) -> f32, mask: impl Fn(usize) -> bool) -> Evide
     found
 }
 
-fn near(a: f64, b: f64, tolerance: f64) {
+pub(crate) fn near(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance, "{a} {b}");
 }
 

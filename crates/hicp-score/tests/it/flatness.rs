@@ -1,5 +1,6 @@
 //! Tests of flatness against known planes and distances.
 
+use crate::evidence::near;
 use crate::support::{Numbers, RayCaster, cuboid, pose, render_depth};
 use hicp_core::{
     Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
@@ -53,10 +54,6 @@ fn flatness(model: &Model, observation: &Observation, pose: &Isometry3<f64>) -> 
 fn seven_tenths(mut distances: Vec<f64>) -> f64 {
     distances.sort_by(f64::total_cmp);
     distances[(distances.len() as f64 * 0.7) as usize]
-}
-
-fn near(a: f64, b: f64, tolerance: f64) {
-    assert!((a - b).abs() <= tolerance, "{a} {b}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use hicp_core::{Isometry3, Point3, UnitQuaternion, Vector3};
 use hicp_score::{add, adi};
 
 /// The corners (±20, ±30, ±40) mm.
-fn corners() -> Vec<Point3<f32>> {
+pub(crate) fn corners() -> Vec<Point3<f32>> {
     (0..8_u8)
         .map(|i| {
             let side = |bit: u8, half: f32| if i >> bit & 1 == 1 { half } else { -half };
@@ -14,16 +14,22 @@ fn corners() -> Vec<Point3<f32>> {
         .collect()
 }
 
-fn rotation(axis: Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
+pub(crate) fn rotation(axis: Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::new(axis * angle)
 }
 
-#[test]
-fn the_golden_case() {
+/// Returns the true and the estimated pose of the golden case, in millimeters.
+pub(crate) fn golden_poses() -> [Isometry3<f64>; 2] {
     let turn = rotation(Vector3::z(), 0.3);
     let truth = Isometry3::from_parts(Vector3::new(10.0, -5.0, 600.0).into(), turn);
     let tilt = rotation(Vector3::x(), 0.2) * turn;
     let estimate = Isometry3::from_parts(Vector3::new(12.0, -4.0, 605.0).into(), tilt);
+    [truth, estimate]
+}
+
+#[test]
+fn the_golden_case() {
+    let [truth, estimate] = golden_poses();
     let expected = 10.932_263_188_943_395;
     assert!((add(&estimate, &truth, &corners()) - expected).abs() < 1e-11);
     assert!((adi(&estimate, &truth, &corners()) - expected).abs() < 1e-11);

@@ -1,23 +1,17 @@
 //! Tests of scores of rendered poses: the MVE against the image, and VSD against a true pose.
 
-use crate::support::{Numbers, RayCaster, cuboid, observe, pose, render_depth, wedge};
-use hicp_core::{
-    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
-};
+use crate::support::{Numbers, RayCaster, camera, cuboid, observe, pose, render_depth, wedge};
+use hicp_core::{Context, DepthImage, Isometry3, Mask, Model, Observation, Problem, RenderCache};
 use hicp_score::{
     MaskTrust, MeanVsd, N_TOLERANCES, Occlusion, SampledMve, Score, VISIBILITY_TOLERANCE_METERS,
     Vsd, tolerances, vsd,
 };
 
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
-}
-
-fn at() -> Isometry3<f64> {
+pub(crate) fn at() -> Isometry3<f64> {
     pose(0.003, -0.002, 0.25, 0.4, -0.3, 0.2)
 }
 
-fn score(
+pub(crate) fn score(
     score: &mut dyn Score,
     model: &Model,
     observation: &Observation,

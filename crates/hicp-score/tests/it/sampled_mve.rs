@@ -2,31 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::support::{Numbers, RayCaster, cuboid, median, observe, pose, wedge};
-use hicp_core::{
-    Context, DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Problem, RenderCache,
-    Sides, TriMesh,
-};
+use crate::rendered::{at, score};
+use crate::support::{Numbers, camera, cuboid, median, observe, pose, wedge};
+use hicp_core::{DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Sides, TriMesh};
 use hicp_score::{Occlusion, SampledMve, Score, VISIBILITY_TOLERANCE_METERS, tolerances};
-
-fn camera() -> PinholeCamera {
-    PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
-}
-
-fn at() -> Isometry3<f64> {
-    pose(0.003, -0.002, 0.25, 0.4, -0.3, 0.2)
-}
-
-fn score(
-    score: &mut SampledMve,
-    model: &Model,
-    observation: &Observation,
-    pose: &Isometry3<f64>,
-) -> f64 {
-    let mut renders = RenderCache::new(RayCaster);
-    let problem = Problem::new(model, observation);
-    score.score(&mut Context::new(problem, &mut renders), pose)
-}
 
 /// Projects points into the pixels of a coarse image, keeps the nearest of each, and computes the
 /// VSD.

@@ -187,6 +187,11 @@ pub fn wedge() -> TriMesh {
     TriMesh::new(vertices, triangles).unwrap()
 }
 
+/// A camera of 64 × 48 pixels that are not square, with a center between pixels.
+pub fn camera() -> PinholeCamera {
+    PinholeCamera::new(80.3, 84.1, 31.3, 23.9, 64, 48).unwrap()
+}
+
 /// Renders an image of a model alone, masked by its silhouette.
 pub fn observe(model: &Model, camera: &PinholeCamera, pose: &Isometry3<f64>) -> Observation {
     let depth = render_depth(model, camera, pose);
