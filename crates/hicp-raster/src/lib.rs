@@ -66,4 +66,3 @@ pub use hicp_core;
 pub use image::render_depth_image;
 pub use projection::DEFAULT_NEAR_METERS;
 pub use rasterizer::{Culling, RasterConfig, Rasterizer};
-pub use region::projected_region;

@@ -1,8 +1,6 @@
 //! The part of an image that a mesh can cover.
 
-use hicp_core::{Isometry3, PinholeCamera, PixelRegion, Point3};
-
-use crate::projection::{Projection, effective_near};
+use hicp_core::PixelRegion;
 
 /// Upper limit, in pixels, of the shift of an edge by rounding in projection and sub-pixel grid.
 const ROUNDING_MARGIN_PIXELS: f64 = 1.0e-5;
@@ -73,57 +71,4 @@ impl Bounds {
 )]
 fn to_pixel(x: f64) -> u32 {
     x as u32
-}
-
-/// Returns the part of `region` that triangles over some points can cover.
-///
-/// Points are in meters in the object frame. `region` is first clipped to the image. The result
-/// contains the pixels whose centers lie in the bounding box of the projected points.
-///
-/// The near plane is at `near_meters` along the optical axis, as in
-/// [`RasterConfig`](crate::RasterConfig). If some points lie in front of it and some beyond it, the
-/// result is all of `region`. If all lie in front of it, or nothing projects into `region`, it is
-/// empty.
-///
-/// [`Rasterizer`](crate::Rasterizer) resets its view to this region over all vertices of the mesh.
-/// Cost: O(points).
-///
-/// ```
-/// use hicp_core::{Isometry3, PinholeCamera, PixelRegion, Point3};
-/// # fn main() -> Result<(), hicp_core::CameraError> {
-/// let camera = PinholeCamera::new(100.0, 100.0, 50.0, 50.0, 101, 101)?;
-/// let points = [Point3::new(-0.1, 0.0, 0.0), Point3::new(0.1, 0.05, 0.0)];
-/// let region = hicp_raster::projected_region(
-///     &points,
-///     &camera,
-///     &Isometry3::translation(0.0, 0.0, 1.0),
-///     &camera.region(),
-///     0.01,
-/// );
-/// assert_eq!(region, PixelRegion { u_min: 40, u_max: 61, v_min: 50, v_max: 56 });
-/// # Ok(()) }
-/// ```
-#[must_use]
-pub fn projected_region(
-    points: &[Point3<f32>],
-    camera: &PinholeCamera,
-    camera_from_object: &Isometry3<f64>,
-    region: &PixelRegion,
-    near_meters: f64,
-) -> PixelRegion {
-    let Some(projection) = Projection::new(camera, camera_from_object) else {
-        return PixelRegion::default();
-    };
-    let near = effective_near(near_meters);
-    let mut bounds = Bounds::EMPTY;
-    for point in points {
-        let h = projection.homogeneous(point);
-        if h.z >= near {
-            let inverse_depth = 1.0 / h.z;
-            bounds.include(h.x * inverse_depth, h.y * inverse_depth);
-        } else {
-            bounds.cut = true;
-        }
-    }
-    bounds.region_within(&region.intersection(&camera.region()))
 }

@@ -53,12 +53,6 @@ impl NormalEquations {
         Some(self.solution(0.0)?.increment)
     }
 
-    /// Solves with another policy.
-    #[must_use]
-    pub fn solve_with(&self, policy: Degeneracy, threshold: f64) -> Option<Isometry3<f64>> {
-        self.with_policy(policy, threshold).solve()
-    }
-
     /// Solves with Marquardt's damping `lambda` ≥ 0, in addition to the policy.
     ///
     /// The damping is relative to each diagonal entry.

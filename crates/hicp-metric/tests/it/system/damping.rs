@@ -121,7 +121,7 @@ fn infinite_stiffness_determines_none() {
     information[(1, 1)] = f64::MAX;
     system.add_twist(&Vector6::zeros(), &Matrix6::identity(), &information);
     for policy in [Degeneracy::Damp, Degeneracy::Freeze, Degeneracy::Ignore] {
-        assert_eq!(system.solve_with(policy, 1e-3), None, "{policy:?}");
+        assert_eq!(system.with_policy(policy, 1e-3).solve(), None, "{policy:?}");
     }
 }
 

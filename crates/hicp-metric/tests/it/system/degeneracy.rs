@@ -212,7 +212,10 @@ fn well_determined_pairs_give_the_same_step_under_every_policy() {
         PointToPlane.step(&pairs).unwrap().increment
     );
     let system = PointToPlane.normal_equations(&pairs).unwrap();
-    assert_eq!(system.solve(), system.solve_with(Degeneracy::Damp, 0.5));
+    assert_eq!(
+        system.solve(),
+        system.with_policy(Degeneracy::Damp, 0.5).solve()
+    );
 }
 
 /// Little information moves a plate sideways, but does not turn it.
@@ -232,7 +235,7 @@ fn weak_translations_are_solved_without_weak_rotations() {
         let point = center() + Vector3::new(x, y, 0.0);
         system.add_row(&point, &(normal * edge), 0.003 * edge, 1.0);
     }
-    let step = |policy| system.solve_with(policy, 5e-3).unwrap();
+    let step = |policy| system.with_policy(policy, 5e-3).solve().unwrap();
     let (shift, still) = (step(Degeneracy::FreezeRotations), step(Degeneracy::Freeze));
     assert!(crate::scenes::difference(&still, &Isometry3::identity()).1 < 1e-9);
     let moved = shift * center() - center();
@@ -245,9 +248,10 @@ fn weak_translations_are_solved_without_weak_rotations() {
     let pulled = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.01);
     system.add_twist(&pulled, &Matrix6::identity(), &(Matrix6::identity() * 1e-2));
     let all = system
-        .solve_with(Degeneracy::FreezeRotations, 1e-6)
+        .with_policy(Degeneracy::FreezeRotations, 1e-6)
+        .solve()
         .unwrap();
-    let same = system.solve_with(Degeneracy::Ignore, 0.0).unwrap();
+    let same = system.with_policy(Degeneracy::Ignore, 0.0).solve().unwrap();
     let (angle, distance) = crate::scenes::difference(&all, &same);
     assert!(angle < 1e-9 && distance < 1e-9, "{angle} {distance}");
     assert!(all.rotation.angle() > 1e-4, "{}", all.rotation.angle());
@@ -266,12 +270,16 @@ fn weak_rotations_that_explain_the_loss_are_solved() {
         system.add_row(&point, &(normal / 0.1), 0.003 * edge, 1.0);
     }
     let angle = |system: &NormalEquations, threshold| {
-        let step = system.solve_with(Degeneracy::FreezeUnexplained, threshold);
+        let step = system
+            .with_policy(Degeneracy::FreezeUnexplained, threshold)
+            .solve();
         step.unwrap().rotation.angle()
     };
     assert!((angle(&system, 5e-3) - 0.03).abs() < 1e-4);
     assert!(angle(&system, 0.1) < 1e-9);
-    let still = system.solve_with(Degeneracy::FreezeRotations, 5e-3);
+    let still = system
+        .with_policy(Degeneracy::FreezeRotations, 5e-3)
+        .solve();
     assert!(still.unwrap().rotation.angle() < 1e-9);
     // An error that no motion explains.
     for error in [0.01, -0.01] {
@@ -287,17 +295,22 @@ fn thresholds_separate_degenerate_directions() {
     let mut numbers = Numbers(86);
     let pairs = messy(&mut numbers, 200);
     let system = PointToPlane.normal_equations(&pairs).unwrap();
-    let still = system.solve_with(Degeneracy::Freeze, 2.0).unwrap();
+    let still = system.with_policy(Degeneracy::Freeze, 2.0).solve().unwrap();
     assert!(crate::scenes::difference(&still, &Isometry3::identity()).1 < 1e-15);
-    assert_eq!(system.solve_with(Degeneracy::Refuse, 2.0), None);
-    assert!(system.solve_with(Degeneracy::Refuse, 0.0).is_some());
+    assert_eq!(system.with_policy(Degeneracy::Refuse, 2.0).solve(), None);
+    assert!(
+        system
+            .with_policy(Degeneracy::Refuse, 0.0)
+            .solve()
+            .is_some()
+    );
     // A ratio equal to the threshold is degenerate, and that of the best direction is 1.
-    let still = system.solve_with(Degeneracy::Freeze, 1.0).unwrap();
+    let still = system.with_policy(Degeneracy::Freeze, 1.0).solve().unwrap();
     assert_eq!(
         crate::scenes::difference(&still, &Isometry3::identity()).1,
         0.0
     );
-    assert_eq!(system.solve_with(Degeneracy::Refuse, 1.0), None);
+    assert_eq!(system.with_policy(Degeneracy::Refuse, 1.0).solve(), None);
     assert_eq!(system.observability().unwrap().n_degenerate(1.0), 6);
     // Six directions with exactly the same information: below 1 the threshold keeps all of them, at
     // 1 none.
@@ -308,12 +321,17 @@ fn thresholds_separate_degenerate_directions() {
         alike.add_row(&Point3::from(-lever), &-direction, 0.1, 1.0);
     }
     assert_eq!(alike.information(), Matrix6::identity() * 2.0);
-    assert!(alike.solve_with(Degeneracy::Refuse, 0.999).is_some());
-    assert_eq!(alike.solve_with(Degeneracy::Refuse, 1.0), None);
+    assert!(
+        alike
+            .with_policy(Degeneracy::Refuse, 0.999)
+            .solve()
+            .is_some()
+    );
+    assert_eq!(alike.with_policy(Degeneracy::Refuse, 1.0).solve(), None);
     // A negative threshold counts as 0.
     let (zero, below) = (
-        system.solve_with(Degeneracy::Freeze, 0.0),
-        system.solve_with(Degeneracy::Freeze, -1.0),
+        system.with_policy(Degeneracy::Freeze, 0.0).solve(),
+        system.with_policy(Degeneracy::Freeze, -1.0).solve(),
     );
     assert_eq!(zero, below);
 }
@@ -341,8 +359,8 @@ fn numbers_that_are_not_finite_give_none() {
         Degeneracy::Refuse,
         Degeneracy::Ignore,
     ] {
-        assert_eq!(empty.solve_with(policy, 1e-3), None);
-        assert_eq!(silent.solve_with(policy, 1e-3), None, "{policy:?}");
+        assert_eq!(empty.with_policy(policy, 1e-3).solve(), None);
+        assert_eq!(silent.with_policy(policy, 1e-3).solve(), None, "{policy:?}");
         let mut metric = conditioned(PointToPlane, policy);
         assert_eq!(metric.step(&Correspondences::new()), None);
         let one: Correspondences = [Pair::new(

@@ -23,7 +23,7 @@ fn the_policy_of_a_system_applies_to_its_solution() {
     ] {
         for threshold in [1e-3, 0.5, 2.0] {
             let own = system.with_policy(policy, threshold);
-            assert_eq!(own.solve(), system.solve_with(policy, threshold));
+            assert_eq!(own.solve(), system.with_policy(policy, threshold).solve());
         }
     }
     // Above the ratio of every direction, all but one are degenerate.
