@@ -119,18 +119,6 @@ impl Fused {
         se3::is_finite(&increment).then_some(increment)
     }
 
-    /// Returns the number of source points, including the padding.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.source[0].len()
-    }
-
-    /// Returns `true` if there is no source point.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.source[0].is_empty()
-    }
-
     #[cfg(target_arch = "x86_64")]
     fn sums(&self, motion: &Motion) -> [f64; SUMS] {
         avx2::sums(self, motion)

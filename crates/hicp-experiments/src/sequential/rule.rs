@@ -99,8 +99,7 @@ impl FusionRule {
     }
 
     /// Returns whether every estimate needs an MVE.
-    #[must_use]
-    pub fn uses_mve(self) -> bool {
+    pub(crate) fn uses_mve(self) -> bool {
         match self {
             Self::Plain(method) => method.uses_covariances(),
             Self::Gated(_) | Self::Calibrated(_) => true,
