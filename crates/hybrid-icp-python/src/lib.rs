@@ -38,35 +38,22 @@ mod warnings;
 #[pyo3(name = "_native")]
 mod native {
     #[pymodule_export]
-    use crate::align::{align, read_cloud};
-    #[pymodule_export]
-    use crate::bop::{PyDatasetRefiner, read_images, result_header};
-    #[pymodule_export]
-    use crate::diagnosis::diagnose;
-    #[pymodule_export]
-    use crate::input::camera::PyCamera;
-    #[pymodule_export]
-    use crate::input::depth::PyDepthImage;
-    #[pymodule_export]
-    use crate::input::image::{read_depth, read_depth_png, read_mask, read_mask_png, read_pose};
-    #[pymodule_export]
-    use crate::input::model::PyModel;
-    #[pymodule_export]
-    use crate::input::observation::{PyObservation, mask_in_box};
-    #[pymodule_export]
-    use crate::pipeline::PyPipeline;
-    #[pymodule_export]
-    use crate::program::run_program;
-    #[pymodule_export]
-    use crate::score::{add, adi, mspd, mssd, mve, render_depth, vsd};
-    #[pymodule_export]
-    use crate::sequence::fusion::{PyFuser, PyPoseEstimate, fuse};
-    #[pymodule_export]
-    use crate::sequence::sequential::PySequentialEstimator;
-    #[pymodule_export]
-    use crate::sequence::tracker::PyTracker;
-    #[pymodule_export]
-    use crate::step::{point_to_plane_step, point_to_point_step};
-    #[pymodule_export]
-    use crate::toml::parts;
+    use crate::{
+        align::{align, read_cloud},
+        bop::{PyDatasetRefiner, read_images, result_header},
+        diagnosis::diagnose,
+        input::camera::PyCamera,
+        input::depth::PyDepthImage,
+        input::image::{read_depth, read_depth_png, read_mask, read_mask_png, read_pose},
+        input::model::PyModel,
+        input::observation::{PyObservation, mask_in_box},
+        pipeline::PyPipeline,
+        program::run_program,
+        score::{add, adi, mspd, mssd, mve, render_depth, vsd},
+        sequence::fusion::{PyFuser, PyPoseEstimate, fuse},
+        sequence::sequential::PySequentialEstimator,
+        sequence::tracker::PyTracker,
+        step::{point_to_plane_step, point_to_point_step},
+        toml::parts,
+    };
 }
