@@ -37,23 +37,35 @@ pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, 
     let value = serde_path_to_error::deserialize(&mut json).map_err(|error| {
         let key = error.path().to_string();
         let root = match key.as_str() {
-            "." => return refusal(path, "$".to_owned(), error.into_inner()),
+            "." => return refusal(path, text, "$".to_owned(), error.into_inner()),
             key if key.starts_with('[') => "$",
             _ => "$.",
         };
         let key = key.escape_debug().take(SHOWN);
-        refusal(path, root.chars().chain(key).collect(), error.into_inner())
+        let key = root.chars().chain(key).collect();
+        refusal(path, text, key, error.into_inner())
     })?;
     match json.end() {
         Ok(()) => Ok(value),
-        Err(error) => Err(refusal(path, String::new(), error)),
+        Err(error) => Err(refusal(path, text, String::new(), error)),
     }
 }
 
-fn refusal(path: &Path, key: String, error: serde_json::Error) -> IoError {
+fn refusal(path: &Path, text: &[u8], key: String, error: serde_json::Error) -> IoError {
     if error.classify() != Category::Data {
         let place = Place::Field(format!("line {}, column {}", error.line(), error.column()));
-        return IoError::new(path, place, "text that is not valid JSON", "JSON").with_source(error);
+        let line = text
+            .split(|byte| *byte == b'\n')
+            .nth(error.line().saturating_sub(1));
+        let rest = line.and_then(|line| line.get(error.column().saturating_sub(1)..));
+        // Python writes them.
+        let special = ["NaN", "Infinity"].into_iter();
+        let mut special = special.filter(|word| rest.unwrap_or(b"").starts_with(word.as_bytes()));
+        return match special.next() {
+            Some(word) => IoError::new(path, place, word, "a number; JSON has null for none"),
+            None => IoError::new(path, place, "text that is not valid JSON", "JSON"),
+        }
+        .with_source(error);
     }
     let text = error.to_string();
     let text = text
@@ -240,12 +252,12 @@ mod tests {
 
     #[test]
     fn syntax_errors_name_line_and_column() {
-        for text in ["{\n \"a\": NaN}", "", "{\n", "[1,]", "1e999", "1 2"] {
+        for text in ["", "{\n", "[1,]", "1e999", "1 2"] {
             let error = document::<Value>(text).unwrap_err();
             assert!(error.found.contains("not valid JSON"), "{text}: {error}");
         }
         let error = document::<Numbers<2>>("[1, Infinity]").unwrap_err();
-        assert!(error.found.contains("not valid JSON"), "{error}");
+        assert_eq!(error.found, "Infinity");
         let error = document::<Value>("{\n \"a\": NaN}").unwrap_err();
         assert_eq!(
             error.place,
@@ -306,6 +318,10 @@ mod tests {
                 "$.7[0].t: found 0, expected a number above 0, in mm",
             ),
             ("3", "$.7[0]: found 3, expected an object with an item"),
+            (
+                "{\"n\": NaN}",
+                ": found NaN, expected a number; JSON has null for none",
+            ),
             (
                 &format!("{{\"n\": \"{long}\"}}"),
                 &format!("the text \"{}\"..., expected", &long[..60]),

@@ -46,7 +46,7 @@ pub(crate) fn point_to_point_step(
     sources: &Bound<'_, PyAny>,
     targets: &Bound<'_, PyAny>,
 ) -> PyResult<(Matrix, f64)> {
-    step(PointToPoint, &pairs(sources, targets, None)?)
+    step(sources.py(), PointToPoint, &pairs(sources, targets, None)?)
 }
 
 /// Computes one step of point-to-plane ICP on given pairs.
@@ -81,11 +81,16 @@ pub(crate) fn point_to_plane_step(
     targets: &Bound<'_, PyAny>,
     normals: &Bound<'_, PyAny>,
 ) -> PyResult<(Matrix, f64)> {
-    step(PointToPlane, &pairs(sources, targets, Some(normals))?)
+    let pairs = pairs(sources, targets, Some(normals))?;
+    step(sources.py(), PointToPlane, &pairs)
 }
 
-fn step(mut metric: impl Minimize, pairs: &Correspondences) -> PyResult<(Matrix, f64)> {
-    let step = metric.minimize(&Iteration::default(), pairs);
+fn step(
+    py: Python<'_>,
+    mut metric: impl Minimize + Send,
+    pairs: &Correspondences,
+) -> PyResult<(Matrix, f64)> {
+    let step = py.detach(|| metric.minimize(&Iteration::default(), pairs));
     let step = step.ok_or_else(|| {
         let count = pairs.len();
         InputError::new_err(format!(

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
+use serde_json::Value;
 
 use super::rle::Rle;
 use crate::error::{IoError, Place};
@@ -24,7 +26,8 @@ pub struct Detection {
     /// Box in pixels: x, y, width, height.
     #[serde(default, deserialize_with = "optional_numbers")]
     pub bbox: Option<[f64; 4]>,
-    /// Run-length code of the mask, decoded by [`Rle::to_mask`].
+    /// Run-length code of the mask, decoded by [`Rle::to_mask`]; `None` also for an empty array.
+    #[serde(default, deserialize_with = "not_empty")]
     pub segmentation: Option<Rle>,
     /// Time spent on the image in seconds, if known.
     #[serde(rename = "time", default, deserialize_with = "known_time")]
@@ -36,6 +39,15 @@ const FROM_COCO: &str = "an array of detections; of the annotations of COCO for 
     python3 -c \"import json, sys; \
     print(json.dumps([{'scene_id': 1, 'score': 1, **a} for a in json.load(sys.stdin)['annotations']]))\" \
     < coco.json > detections.json";
+
+/// Reads a run-length code. Detectors of boxes write an empty array.
+fn not_empty<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Rle>, D::Error> {
+    let code = Value::deserialize(deserializer)?;
+    if code.is_null() || code.as_array().is_some_and(Vec::is_empty) {
+        return Ok(None);
+    }
+    Rle::deserialize(code).map(Some).map_err(D::Error::custom)
+}
 
 /// Reads a time in seconds. BOP writes −1 for an unknown time.
 fn known_time<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
@@ -102,7 +114,9 @@ mod tests {
             assert_eq!((mask.width(), mask.height()), (2, 3));
             assert_eq!(mask.pixels(), [false, true, true, false, false, false]);
         }
-        assert_eq!(read("null").unwrap()[0].segmentation, None);
+        for none in ["null", "[]"] {
+            assert_eq!(read(none).unwrap()[0].segmentation, None);
+        }
     }
 
     #[test]

@@ -135,7 +135,7 @@ impl PyDepthImage {
         let pose = pose.transpose()?;
         let pose = pose.map_or_else(Isometry3::identity, |pose| pose.isometry);
         let any = !points.is_empty();
-        let image = DepthImage::from_points(points, &camera.0, &pose);
+        let image = py.detach(|| DepthImage::from_points(points, &camera.0, &pose));
         if any && image.pixels().iter().all(|z| *z == 0.0) {
             let text = "no point is in the image: expected points in front of the camera, meters, \
                         with z forward, or their pose T_cp, camera from points, meters";

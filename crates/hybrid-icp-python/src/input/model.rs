@@ -175,23 +175,26 @@ impl PyModel {
     ///     If a file cannot be read, or there is no such model.
     #[staticmethod]
     fn from_bop(py: Python<'_>, folder: PathBuf, obj_id: u32) -> PyResult<Self> {
-        let model = py
+        let (model, path) = py
             .detach(|| {
                 let models = match folder.join("models").is_dir() {
                     true => Dataset::open(&folder)?.models_dir()?.to_path_buf(),
                     false => folder.clone(),
                 };
+                let path = Dataset::model_path_in(&models, obj_id);
                 let places = [models.clone(), models.join("../models")];
                 let mut infos = places
                     .map(|place| place.join("models_info.json"))
                     .into_iter();
                 let info = infos.find(|info| info.exists()).unwrap_or_default();
-                ModelFolder::with_info(ReadLimits::DEFAULT, models, info)?.read(obj_id)
+                let folder = ModelFolder::with_info(ReadLimits::DEFAULT, models, info)?;
+                folder.read(obj_id).map(|model| (model, path))
             })
             .map_err(errors::file)?;
         model.map(Self::of).ok_or_else(|| {
-            let folder = folder.display();
-            errors::FileError::new_err(format!("{folder}: no model of object {obj_id}"))
+            let (folder, path) = (folder.display(), path.display());
+            let text = format!("{folder}: no model of object {obj_id}, expected {path}");
+            errors::FileError::new_err(text)
         })
     }
 

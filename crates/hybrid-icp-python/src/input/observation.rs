@@ -238,12 +238,14 @@ impl PyObservation {
     ///     Meters.
     /// normals : numpy.ndarray, shape (n_surfels, 3), float32
     ///     Unit length, toward the camera.
-    fn surfels(&self) -> (Matrix<f32>, Matrix<f32>) {
+    fn surfels(&self, py: Python<'_>) -> (Matrix<f32>, Matrix<f32>) {
         let (mut points, mut normals) = (Vec::new(), Vec::new());
-        for (_, surfel) in self.observation.surfels(1) {
-            points.extend_from_slice(surfel.point.coords.as_slice());
-            normals.extend_from_slice(surfel.normal.as_slice());
-        }
+        py.detach(|| {
+            for (_, surfel) in self.observation.surfels(1) {
+                points.extend_from_slice(surfel.point.coords.as_slice());
+                normals.extend_from_slice(surfel.normal.as_slice());
+            }
+        });
         (Matrix::new(3, points), Matrix::new(3, normals))
     }
 
