@@ -341,9 +341,15 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
 
     /// Fits the best of all poses found, until one is good enough. Then refines that one, and
     /// others that may be as good.
-    fn finish(&mut self, run: &mut Run<'_, '_>) {
+    ///
+    /// If the local pose is not `beatable`, fits one other pose, for the list of alternatives.
+    fn finish(&mut self, run: &mut Run<'_, '_>, beatable: bool) {
         let refined = run.options.refined;
-        for finalist in 0..FINALISTS.max(refined / 2) {
+        let (fits, refinements) = match beatable {
+            true => (FINALISTS.max(refined / 2), (refined / REFINED).max(1)),
+            false => (1, 0),
+        };
+        for finalist in 0..fits {
             let good = |best: Found| best.doubt() <= run.options.good_enough;
             let enough = finalist >= FINALISTS && self.found.cheapest().is_some_and(good);
             if enough || run.is_over_after(finalist) {
@@ -354,7 +360,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
             };
             self.fit(run, explored);
         }
-        for finalist in 0..(refined / REFINED).max(1) {
+        for finalist in 0..refinements {
             if run.is_over_after(finalist) {
                 break;
             }
@@ -426,7 +432,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
             self.search(&mut run, &pose);
         }
         self.try_look_alikes(&mut run, threshold);
-        self.finish(&mut run);
+        self.finish(&mut run, beatable);
         let (mut returned, mut score) = (local, from.map_or(f64::INFINITY, |from| from.score));
         let wins = |found: &Found, gain| from.is_none_or(|from| found.beats(&from, gain));
         if let Some(best) = self.found.cheapest().filter(|best| wins(best, gain)) {
