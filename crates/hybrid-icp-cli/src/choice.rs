@@ -33,8 +33,8 @@ pub(crate) struct PipelineArguments {
     /// `auto`, the default, refines locally, and searches if the result stays doubtful. After a
     /// search, the result may be far from the initial pose. `--set max_rotation_degrees=30` and
     /// `--set max_translation_meters=0.05` limit the distance. `color`, the default if color images
-    /// are used and nothing is set, also lets color decide where depth cannot. `local` never
-    /// searches. `hybrid` is the paper's method.
+    /// are given to a command that uses them and nothing is set, also lets color decide where
+    /// depth cannot. `local` never searches. `hybrid` is the paper's method.
     #[arg(long, value_name = "NAME|FILE.toml")]
     pipeline: Option<Source>,
     /// Override a field of the pipeline, such as threshold=0.1 of auto or times=3 of hybrid; may be

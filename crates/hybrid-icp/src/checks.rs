@@ -204,20 +204,39 @@ pub fn warnings_of_model(model: &Model) -> Vec<Warning> {
     if !model.has_possible_diameter() {
         warnings.extend(warning_of_diameter(model));
     }
-    let center = model.center();
-    let symmetries = model.symmetries();
-    let half_turns = symmetries.continuous.iter().map(|axis| axis.rotation(PI));
-    let distances = symmetries.discrete.iter().copied().chain(half_turns);
-    let distances = distances.map(|motion| (motion * center - center).norm());
-    let distance = distances.fold(0.0, f64::max);
-    if distance > MOVED * diameter {
-        warnings.push(Warning::Symmetry { distance, diameter });
-    }
+    warnings.extend(warning_of_symmetries(model));
     let step = model.mesh().coordinate_step();
     if step > COARSE * diameter {
         warnings.push(Warning::CoarseCoordinates { step, diameter });
     }
     warnings
+}
+
+/// Returns [`Warning::Symmetry`] if a declared symmetry moves the center by more than half of the
+/// diameter.
+///
+/// ```
+/// use hybrid_icp::core::{Model, ModelConfig, Point3, Symmetries, SymmetryAxis, TriMesh, Vector3};
+/// use hybrid_icp::{Warning, checks::warning_of_symmetries};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let corners = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.]].map(Point3::from);
+/// let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?;
+/// // An offset of 50 mm that was read as meters.
+/// let axis = SymmetryAxis::new(Vector3::z(), Point3::new(50.0, 50.0, 0.0))?;
+/// let symmetries = Symmetries { continuous: vec![axis], ..Symmetries::default() };
+/// let model = Model::with_config(mesh, ModelConfig { symmetries, ..ModelConfig::default() });
+/// assert!(matches!(warning_of_symmetries(&model), Some(Warning::Symmetry { .. })));
+/// # Ok(()) }
+/// ```
+#[must_use]
+pub fn warning_of_symmetries(model: &Model) -> Option<Warning> {
+    let (center, diameter) = (model.center(), model.diameter());
+    let symmetries = model.symmetries();
+    let half_turns = symmetries.continuous.iter().map(|axis| axis.rotation(PI));
+    let motions = symmetries.discrete.iter().copied().chain(half_turns);
+    let distances = motions.map(|motion| (motion * center - center).norm());
+    let distance = distances.fold(0.0, f64::max);
+    (distance > MOVED * diameter).then_some(Warning::Symmetry { distance, diameter })
 }
 
 /// Returns [`Warning::StatedDiameter`] if a model's stated diameter differs by more than 5 % from

@@ -224,7 +224,9 @@ impl Judge {
         let excluded = |warning: &Warning| {
             !matches!(
                 warning,
-                Warning::CoarseCoordinates { .. } | Warning::Center { .. }
+                Warning::CoarseCoordinates { .. }
+                    | Warning::Center { .. }
+                    | Warning::Symmetry { .. }
             )
         };
         let warnings = warnings(&inputs.model, &observation, &inputs.init);

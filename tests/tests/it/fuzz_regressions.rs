@@ -51,7 +51,7 @@ fn every_target_passes_on_its_seeds() {
 }
 
 /// Readers, with the beginning of a file that gets random bytes past their first checks.
-const STARTS: [(&str, &str); 14] = [
+const STARTS: [(&str, &str); 15] = [
     ("obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf "),
     ("stl", "solid x\nfacet normal 0 0 1\nouter loop\nvertex "),
     ("ply", "ply\nformat ascii 1.0\nelement vertex "),
@@ -74,8 +74,9 @@ const STARTS: [(&str, &str); 14] = [
     ("png", "\u{89}PNG\r\n\u{1a}\n"),
     ("pose_json", "{\""),
     ("camera_json", "{\""),
-    // The first byte selects the file: information of models, targets, or detections.
-    ("bop_json", "3{\"1\":{\"cam_K\":["),
+    // The first byte selects the file: cameras, information of models, targets, or detections.
+    ("bop_json", "2{\"1\":{\"cam_K\":["),
+    ("bop_json", "3{\"1\":{\"diameter\":"),
     ("bop_json", "4[{\"scene_id\":"),
     ("bop_json", "5[{\"scene_id\":"),
     (

@@ -72,9 +72,12 @@ pub(crate) struct CameraRecord {
         alias = "D",
         alias = "coeffs",
         alias = "dist_coeffs",
+        alias = "distCoeffs",
+        alias = "distortion_coeffs",
         alias = "distortion_coefficients"
     )]
     distortion: Option<Value>,
+    k1: Option<Value>,
 }
 
 /// A calibration matrix in pixels, the width and height of the images, and the key of the matrix.
@@ -85,9 +88,7 @@ type Calibration = (Matrix3<f64>, Option<(u32, u32)>, &'static str);
 impl CameraRecord {
     /// Returns whether a coefficient of a distortion is not 0.
     fn is_distorted(&self) -> bool {
-        let listed = self.distortion.as_ref().and_then(Value::as_array);
-        let mut coefficients = listed.into_iter().flatten();
-        coefficients.any(|coefficient| coefficient.as_f64() != Some(0.0))
+        self.distortion.iter().chain(&self.k1).any(has_number)
     }
 
     /// Returns the calibration. The error consists of the found and the expected text.
@@ -115,6 +116,15 @@ impl CameraRecord {
                 "the key `cam_K` or `cam_model`, or all of `fx`, `fy`, `cx`, `cy`, `width` and `height`",
             )),
         }
+    }
+}
+
+/// Returns whether a value contains a number that is not 0.
+fn has_number(value: &Value) -> bool {
+    match value {
+        Value::Array(items) => items.iter().any(has_number),
+        Value::Object(members) => members.values().any(has_number),
+        value => value.as_f64().is_some_and(|number| number != 0.0),
     }
 }
 
@@ -244,7 +254,7 @@ mod tests {
             (format!(r#"{{"7": {{{K}, "depth_scale": 1}}}}"#), Some(1.0)),
             (format!(r#"{{"7": {FLAT}}}"#), None),
             (FLAT.to_owned(), None),
-            (format!(r#"{{{K}, "dist": [0, 0.0, 0, 0]}}"#), None),
+            (format!(r#"{{{K}, "dist": [[0, 0.0, 0, 0]]}}"#), None),
         ] {
             assert_eq!(
                 read(&text).unwrap(),
@@ -259,8 +269,13 @@ mod tests {
 
     #[test]
     fn a_distortion_is_refused() {
-        for key in ["distortion", "dist_coeffs"] {
-            let error = read(&format!(r#"{{"7": {{{K}, "{key}": [0, 0.1, 0, 0]}}}}"#)).unwrap_err();
+        for member in [
+            r#""distortion": [0, 0.1, 0, 0]"#,
+            r#""dist_coeffs": [[0.1, 0, 0, 0, 0]]"#,
+            r#""dist": {"k1": 0.1}"#,
+            r#""k1": 0.1"#,
+        ] {
+            let error = read(&format!(r#"{{"7": {{{K}, {member}}}}}"#)).unwrap_err();
             assert_eq!(error.found, "the distortion of a lens", "{error}");
         }
     }

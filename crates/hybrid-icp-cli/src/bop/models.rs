@@ -7,7 +7,8 @@ use clap::Args;
 use hicp_bop::{ModelFolder, Models, chain};
 use hicp_io::bop::Dataset;
 use hicp_io::{IoError, LengthUnit};
-use hybrid_icp::checks::{warning_of_diameter, warnings_of_model};
+use hybrid_icp::Warning;
+use hybrid_icp::checks::{warning_of_diameter, warning_of_symmetries, warnings_of_model};
 use hybrid_icp::core::Model;
 use rayon::prelude::*;
 
@@ -46,15 +47,15 @@ impl ModelOptions {
 
 /// Returns the reasons why the colors of the meshes cannot be used.
 ///
-/// Without `--models`, they matter only if the dataset `has_color` images. Reads the meshes without
+/// Without `--models`, they matter only if the pipeline `compares` colors. Reads the meshes without
 /// color again.
 pub(crate) fn color_faults(
     options: &ModelOptions,
     models: &Models,
     folder: &ModelFolder,
-    has_color: bool,
+    compares: bool,
 ) -> Vec<String> {
-    if options.no_color || (options.folder.is_none() && !has_color) {
+    if options.no_color || (options.folder.is_none() && !compares) {
         return Vec::new();
     }
     let fault = |(obj_id, model): (&u32, &Model)| {
@@ -83,13 +84,15 @@ pub(crate) fn read_from(folder: &ModelFolder, objects: &BTreeSet<u32>) -> Models
 /// `dir` is their folder, and `info` the path of `models_info.json`.
 pub(crate) fn warn_of(models: &Models, dir: &Path, info: &Path) {
     undescribed(models, info).into_iter().for_each(warn);
+    wrong_symmetries(models, info).iter().for_each(warn);
     let diameters = wrong_diameters(models, info);
     for (obj_id, model) in &models.by_id {
         let diameter = diameters.get(obj_id);
         diameter.into_iter().for_each(warn);
         for warning in warnings_of_model(model) {
             // One warning about the same number is enough.
-            if diameter.is_none() || !is_about_diameter(&warning) {
+            let is_told = diameter.is_some() && is_about_diameter(&warning);
+            if !is_told && !matches!(warning, Warning::Symmetry { .. }) {
                 let dir = dir.display();
                 warn(format_args!(
                     "object {obj_id}: {warning}: check that {dir} is in mm"
@@ -116,6 +119,16 @@ pub(crate) fn wrong_diameters(models: &Models, info: &Path) -> BTreeMap<u32, Str
             info.display()
         );
         Some((*obj_id, text))
+    });
+    wrong.collect()
+}
+
+/// Returns a message for each object with a symmetry in `models_info.json`, at path `info`, that
+/// moves it to another place.
+pub(crate) fn wrong_symmetries(models: &Models, info: &Path) -> Vec<String> {
+    let wrong = models.by_id.iter().filter_map(|(obj_id, model)| {
+        let warning = warning_of_symmetries(model)?;
+        Some(format!("{}: object {obj_id}: {warning}", info.display()))
     });
     wrong.collect()
 }

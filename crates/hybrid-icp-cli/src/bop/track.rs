@@ -14,9 +14,10 @@ use crate::track::steps::{Line, Rate};
 
 /// Track a moving object through the images of a scene, without masks.
 ///
-/// Images are read by ascending id. Neither the object nor the camera has to stand still, and the
-/// camera's motion is not used. The pose in an image is predicted from the motion so far, and
-/// refined in the pixels around the predicted silhouette.
+/// Images are read by ascending id; those whose ids are not successive are further apart. Neither
+/// the object nor the camera has to stand still, and the camera's motion is not used. The pose in
+/// an image is predicted from the motion so far, and refined in the pixels around the predicted
+/// silhouette.
 ///
 /// The output has one line of JSON per image: the pose (cam_R_m2c, cam_t_m2c in mm), the state
 /// (tracking, doubtful or lost), and the evidence. The score is the share of the visible pixels

@@ -9,6 +9,7 @@ use clap::error::ErrorKind;
 use hicp_bop::chain;
 use hicp_io::bop::ModelInfo;
 use hicp_io::{LengthUnit, MeshFile};
+use hybrid_icp::Warning;
 use hybrid_icp::checks::warning_of_diameter;
 use hybrid_icp::core::{Model, ModelConfig};
 use serde::{Deserialize, Serialize};
@@ -91,7 +92,19 @@ impl ObjectFiles {
         Ok((Model::with_config(mesh, config), warnings))
     }
 
-    /// Reads the declared symmetries of the mesh, and the diameter beside them.
+    /// Returns a warning about the model with the file and the option to check.
+    pub(crate) fn describe(&self, warning: &Warning) -> String {
+        let mesh = self.mesh.display();
+        match (warning, &self.symmetries, self.unit()) {
+            (Warning::Diameter { .. }, _, Ok(unit)) => {
+                format!("{mesh}: {warning}, check --model-unit {unit}")
+            }
+            (Warning::Symmetry { .. }, Some(path), _) => format!("{}: {warning}", path.display()),
+            _ => format!("{mesh}: {warning}"),
+        }
+    }
+
+    /// Reads the declared symmetries of the mesh, and the diameter next to them.
     fn read_symmetries(&self) -> anyhow::Result<Option<ModelInfo>> {
         let Some(path) = &self.symmetries else {
             return Ok(None);

@@ -71,7 +71,6 @@ pub(super) fn about_inputs(
     });
     let files = &inputs.files;
     let (unit, depth) = (files.object.unit()?, files.depth.display());
-    let model = files.object.mesh.display();
     let mask = inputs.mask_name();
     let (init, pose_unit, size_unit) = match &inputs.init {
         Some(path) => (
@@ -87,7 +86,6 @@ pub(super) fn about_inputs(
         None => "",
     };
     let in_words = |warning| match warning {
-        Warning::Diameter { .. } => format!("{model}: {warning}, check --model-unit {unit}"),
         Warning::BehindCamera { .. } => format!("{init}: {warning}{doctor}"),
         Warning::Center { .. } => format!("{}: {warning}", files.camera.display()),
         Warning::NoDepth => format!(
@@ -100,7 +98,7 @@ pub(super) fn about_inputs(
         Warning::Mask { .. } | Warning::Sliver { .. } => {
             format!("{mask}: {warning}: check --model-unit {unit}{size_unit}{doctor}")
         }
-        _ => format!("{model}: {warning}"),
+        _ => files.object.describe(&warning),
     };
     Ok(warnings.map(in_words).collect())
 }

@@ -24,7 +24,7 @@ const MAX_FPS: f64 = 1000.0;
 /// The rate of the images.
 #[derive(Debug, Args)]
 pub(crate) struct Rate {
-    /// Number of images per second. Images whose numbers are not successive are further apart.
+    /// Number of images per second.
     #[arg(long, value_name = "N", default_value_t = 30.0, value_parser = positive, allow_negative_numbers = true)]
     fps: f64,
 }
@@ -104,7 +104,7 @@ impl Line {
         self.tracked.state == TrackState::Tracking
     }
 
-    /// Returns a line of JSON that starts with the keys of `image`.
+    /// Returns a line of JSON that includes the keys of `image`.
     pub(crate) fn json(&self, image: Value) -> Value {
         let Tracked {
             state, evidence, ..

@@ -42,7 +42,7 @@ fn images_of_a_folder_are_tracked_as_those_of_a_dataset() {
     );
     assert_eq!(lines.len(), expected.len());
     for (image, (line, expected)) in lines.iter().zip(&expected).enumerate() {
-        assert_eq!(line["depth"], format!("frame-{image}.depth.png"));
+        assert_eq!(line["depth"], format!("depth/frame-{image}.depth.png"));
         for key in [
             "cam_R_m2c",
             "cam_t_m2c",
@@ -60,7 +60,7 @@ fn images_of_a_folder_are_tracked_as_those_of_a_dataset() {
     let words = TRACK.replace("--depth depth", &format!("--depth {ten} {two}"));
     folder.command(words).exits(0);
     let lines = folder.json_lines("out.jsonl");
-    assert_eq!(lines[0]["depth"], "frame-10.depth.png");
+    assert_eq!(lines[0]["depth"], ten);
     assert_eq!(lines.len(), 2);
 }
 
@@ -80,6 +80,12 @@ fn damaged_images_are_reported_and_have_a_predicted_pose() {
     hicp_io::write_depth_png(folder.path(damaged), &small, 1.0).unwrap();
     let sizes = ["frame-2.depth.png: 64x48 pixels, expected 640x480"];
     folder.command(TRACK).fails(&sizes);
+    // Also the first image; a hidden file is none.
+    folder.write(damaged, folder.bytes("depth/frame-3.depth.png"));
+    folder.write("depth/frame-0.depth.png", "no image");
+    folder.write("depth/._frame-0.depth.png", "no image");
+    folder.command(TRACK).fails(&["1 file could not be used"]);
+    assert_eq!(folder.json_lines("out.jsonl").len(), 4);
 }
 
 #[test]
@@ -88,7 +94,10 @@ fn an_object_that_is_never_tracked_is_warned_of() {
     let advice = "tracked in none of its 2 images: do not trust its poses, and check init.json, \
                   --init-unit, set/models/obj_000001.ply, --model-unit, camera.json";
     let words = TRACK.replace("--model-unit mm", "--model-unit m");
-    folder.command(words).warns(&[advice]);
+    let of_model = "obj_000001.ply: the model's diameter is";
+    folder
+        .command(words)
+        .warns(&[advice, of_model, "check --model-unit m"]);
 }
 
 #[test]
@@ -109,4 +118,5 @@ fn wrong_inputs_of_a_recording_are_refused() {
     folder
         .command(TRACK)
         .fails(&["camera.json", "depth_scale", "--depth-scale"]);
+    assert!(!folder.path("out.jsonl").exists());
 }

@@ -199,8 +199,8 @@ class DepthImage:
     ----------
     depth : numpy.ndarray, shape (H, W) or (H, W, 1)
         Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
-        more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
-        uint16.
+        more bits with `scale`. Pixels without a measurement are 0, negative, infinite or NaN, or
+        65535 in uint16.
     scale : float, optional
         Meters per unit of an image of integers, such as 0.001; BOP's `depth_scale` divided by 1000.
 
@@ -1086,7 +1086,7 @@ class SequentialEstimator:
         camera. Otherwise uncertainty refers to the center of the object, estimates with an MVE
         above 0.4 are rejected, and symmetric poses are fused as one.
     covariance : {"mve", "calibrated"}, optional
-        Covariance of the estimates. "calibrated", the default without `paper`, is at least about as
+        Covariance of the estimates. "calibrated", the default and excluded by `paper`, is about as
         wide as the errors: the covariance of the registration, with factors that were fitted to
         "hybrid" and to models reconstructed from images. It also rejects estimates with an MVE
         above 0.25, and those that are far from the fused pose. "mve" is a weight: the MVE in units

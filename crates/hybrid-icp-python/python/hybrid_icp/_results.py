@@ -58,6 +58,10 @@ class _Record:
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.__post_init__()
+
     def to_dict(self) -> dict[str, Any]:
         """Returns all attributes but a model as plain Python values that `json.dumps` accepts.
 

@@ -39,8 +39,8 @@ const GRID: usize = 64;
 /// ----------
 /// depth : numpy.ndarray, shape (H, W) or (H, W, 1)
 ///     Depth along the optical axis: float32 (or float16 or float64) meters, or integers of 16 or
-///     more bits with `scale`. Pixels without a measurement are 0, negative or NaN, or 65535 in
-///     uint16.
+///     more bits with `scale`. Pixels without a measurement are 0, negative, infinite or NaN, or
+///     65535 in uint16.
 /// scale : float, optional
 ///     Meters per unit of an image of integers, such as 0.001; BOP's `depth_scale` divided by 1000.
 ///

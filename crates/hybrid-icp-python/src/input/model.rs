@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use hicp_bop::ModelFolder;
 use hicp_io::bop::Dataset;
 use hicp_io::{LengthUnit, ReadLimits};
+use hybrid_icp::Warning;
 use hybrid_icp::checks::warnings_of_model;
 use hybrid_icp::core::{
     MAX_SAMPLES, MAX_SYMMETRY_MOTIONS, Model, ModelConfig, Point3, Symmetries, SymmetryAxis,
@@ -484,8 +485,11 @@ impl<'a, 'py> Options<'a, 'py> {
         };
         let model = py.detach(|| Model::with_config(mesh, config));
         for warning in warnings_of_model(&model) {
-            let unit = self.unit.to_string();
-            errors::warn(py, &format!("{warning}: check unit={unit:?}"))?;
+            let text = match warning {
+                Warning::Symmetry { .. } => warning.to_string(),
+                _ => format!("{warning}: check unit={:?}", self.unit.to_string()),
+            };
+            errors::warn(py, &text)?;
         }
         Ok(PyModel::of(model))
     }

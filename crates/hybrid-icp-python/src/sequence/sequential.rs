@@ -34,7 +34,7 @@ use crate::sequence::fusion::{self, PyPoseEstimate};
 ///     camera. Otherwise uncertainty refers to the center of the object, estimates with an MVE
 ///     above 0.4 are rejected, and symmetric poses are fused as one.
 /// covariance : {"mve", "calibrated"}, optional
-///     Covariance of the estimates. "calibrated", the default without `paper`, is at least about as
+///     Covariance of the estimates. "calibrated", the default and excluded by `paper`, is about as
 ///     wide as the errors: the covariance of the registration, with factors that were fitted to
 ///     "hybrid" and to models reconstructed from images. It also rejects estimates with an MVE
 ///     above 0.25, and those that are far from the fused pose. "mve" is a weight: the MVE in units

@@ -9,7 +9,7 @@ use hybrid_icp::fusion::{
     CameraMotion, CovarianceModel, Failure, FuserConfig, FusionError, FusionMethod, Gate, Gated,
     InflatedCovariance, UnitCovariance, Update,
 };
-use hybrid_icp::icp::{Outcome, Session, Stage};
+use hybrid_icp::icp::{Outcome, Session, Stage, Termination};
 use hybrid_icp::score::Score;
 use hybrid_icp::{
     Calibration, Preset, SequentialConfig, SequentialEstimator, SequentialEvent, Trace, presets,
@@ -410,4 +410,36 @@ fn a_camera_motion_without_an_image_moves_the_pose() {
         unobserved.step(&model, observation, &CameraMotion::none()),
         step
     );
+}
+
+/// Ends at the poses of a list, one after another.
+struct Listed(std::vec::IntoIter<Isometry3<f64>>);
+
+impl Stage for Listed {
+    fn run(&mut self, _: &Problem<'_>, _: &Isometry3<f64>, _: &mut Session<'_>) -> Outcome {
+        let pose = self.0.next().expect("a pose per image");
+        Outcome::refined(pose, Termination::Converged)
+    }
+}
+
+#[test]
+fn an_estimator_of_an_object_fuses_the_newest_hundred_estimates() {
+    let Path { model, frames } = path(Household::Iron, 1, 0.0, 9);
+    let (observation, truth, _) = &frames[0];
+    let along = |step: i32| Isometry3::translation(f64::from(step) * 1e-6, 0.0, 0.0) * truth;
+    let listed = |range: std::ops::Range<i32>| -> Vec<_> { range.map(along).collect() };
+    let fused = |poses: Vec<Isometry3<f64>>| {
+        let count = poses.len();
+        let stage = Listed(poses.into_iter());
+        let mut estimator =
+            SequentialEstimator::for_object(stage, FusionMethod::Average, &model, truth)
+                .expect("the model has a size");
+        for _ in 0..count {
+            estimator.step(&model, observation, &CameraMotion::none());
+        }
+        estimator.camera_from_object().translation.vector
+    };
+    let (all, newest) = (fused(listed(0..130)), fused(listed(30..130)));
+    assert!((all - newest).norm() < 1e-12, "{all} {newest}");
+    assert!((fused(listed(29..129)) - newest).norm() > 1e-7);
 }

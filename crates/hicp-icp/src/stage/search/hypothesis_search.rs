@@ -38,7 +38,8 @@ use crate::stage::stage_trait::Stage;
 /// 6. **Finish**: the finishing stage fits the two best poses that differ, and up to a half of
 ///    `refined` if all stay doubtful. They are compared by score + doubt / 10, before the fit and
 ///    after it. Then the local stage refines the best one. If the local pose is far from the
-///    initial one, it also refines up to three others within 0.04.
+///    initial one, it also refines up to three others within 0.04. If no pose can beat the local
+///    one, one fit of another pose is enough, for the list of the others.
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
 /// [`SearchOptions::far_gain`] if the local pose is far from the initial one. If another pose looks

@@ -13,19 +13,6 @@ fn system(seed: u64) -> NormalEquations {
 #[test]
 fn the_policy_of_a_system_applies_to_its_solution() {
     let system = system(3);
-    for policy in [
-        Degeneracy::Damp,
-        Degeneracy::Freeze,
-        Degeneracy::FreezeRotations,
-        Degeneracy::FreezeUnexplained,
-        Degeneracy::Refuse,
-        Degeneracy::Ignore,
-    ] {
-        for threshold in [1e-3, 0.5, 2.0] {
-            let own = system.with_policy(policy, threshold);
-            assert_eq!(own.solve(), system.with_policy(policy, threshold).solve());
-        }
-    }
     // Above the ratio of every direction, all but one are degenerate.
     let refused = system.with_policy(Degeneracy::Refuse, 0.999_999);
     assert!(refused.solve().is_none() && system.solve().is_some());

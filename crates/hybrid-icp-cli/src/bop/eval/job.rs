@@ -110,6 +110,7 @@ impl EvalJob {
 
         let mut warnings: Vec<String> = diameters.into_values().collect();
         warnings.extend(models::undescribed(&models, &info));
+        warnings.extend(models::wrong_symmetries(&models, &info));
         warnings.extend(self.misfits(&rows, &wanted));
         let missing = models::missing(&models, &models_dir);
         warnings.extend(missing.map(|text| format!("{text}; its targets are left out")));

@@ -37,7 +37,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// A folder of meshes (PLY, OBJ, STL) or BOP models (models_info.json with obj_000001.ply, …).
-    /// Without it, the twenty household objects are used.
+    /// Ids are kept if all meshes have one in their names, else the meshes are numbered from 1 by
+    /// name. Without the option, the twenty household objects are used.
     #[arg(long, value_name = "DIR")]
     objects: Option<PathBuf>,
     /// The length unit of the meshes: m, mm or cm. BOP models are always in mm.

@@ -35,8 +35,8 @@ pub(crate) struct JobOptions {
     #[arg(long, value_name = "BY", value_enum, hide_possible_values = true)]
     rescore: Option<RescoreBy>,
     /// Write up to K poses per row: its own, and at the end of the file the distinct other poses
-    /// that a search found. The score of another pose is lower by its gap in MVE. Without a search,
-    /// there are none.
+    /// that a search found. The score of another pose is the lowest of the object's refined rows in
+    /// the image, minus its gap in MVE. Without a search, there are none.
     #[arg(
         long,
         value_name = "K",

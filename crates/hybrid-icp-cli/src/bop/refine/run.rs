@@ -33,8 +33,15 @@ impl RefineJob<'_> {
         let objects: BTreeSet<u32> = rows.iter().map(|row| row.obj_id).collect();
         let models = pool.install(|| models::read_from(&folder, &objects));
         pool.install(|| models::warn_of(&models, folder.dir(), folder.info_path()));
+        let preset: Result<Preset, _> = self.pipeline.name.parse();
         let has_color = self.dataset.has_color();
-        let uncolored = models::color_faults(&self.models, &models, &folder, has_color);
+        // Without color images, `color` runs only if `--pipeline` names it.
+        let compares = match preset {
+            Ok(Preset::Color) => true,
+            Ok(_) => self.estimates() && has_color,
+            Err(_) => has_color,
+        };
+        let uncolored = models::color_faults(&self.models, &models, &folder, compares);
         uncolored.iter().for_each(warn);
         let shared = DatasetRefiner {
             models,
@@ -68,13 +75,6 @@ impl RefineJob<'_> {
         for result in &results {
             result.enter(&mut rows, self.rescore, self.timed);
         }
-        let preset: Result<Preset, _> = self.pipeline.name.parse();
-        // Only who names `color` gets it without color images.
-        let compares = match preset {
-            Ok(Preset::Color) => true,
-            Ok(_) => self.estimates() && has_color,
-            Err(_) => has_color,
-        };
         let count = results.iter().filter(|result| result.uncolored).count();
         if count > 0 && compares {
             let of = counted(results.len(), "frame");

@@ -166,12 +166,16 @@ pub(super) fn report_faults(
     let is_missing = |row: &RowResult| row.status == RowStatus::MissingFrame;
     if !results.is_empty() && rows_of(results).all(is_missing) {
         bail!(
-            "{}: the images of none of its rows can be read in {}, expected --dataset, --split and --sensor to name their cameras and depth images",
+            "{}: no image of its rows can be read in {}, expected --dataset, --split and --sensor to name their cameras and depth images",
             job.results.display(),
             job.dataset.root.join(&job.dataset.split).display()
         );
     }
-    if job.estimates() && rows_of(results).all(|row| row.pose.is_none()) {
+    let is_empty = |row: &RowResult| row.status == RowStatus::NothingMeasured;
+    if rows_of(results).all(|row| row.pose.is_none())
+        && job.estimates()
+        && rows_of(results).any(is_empty)
+    {
         warn(format_args!(
             "{}: no pose is estimated: check that bbox is x, y, width, height in pixels of the depth image, and segmentation of its size",
             job.results.display()

@@ -438,6 +438,6 @@ fn a_dataset_without_any_of_the_frames_is_an_error() {
         ResultRow::new(99, 0, CAR, pose),
     ];
     let (run, refined) = world.refine(&rows, "");
-    run.fails(&["in.csv", "the images of none of its rows", "--split"]);
+    run.fails(&["in.csv", "no image of its rows", "--split"]);
     assert!(rows.iter().zip(&refined).all(|(a, b)| same_pose(a, b)));
 }

@@ -55,6 +55,15 @@ fn clean_inputs_have_no_fault() {
         (&json!([]), &json!([]))
     );
     assert!(text.starts_with("no fault found (score 0."), "{text}");
+    // A symmetry in another unit is a warning, and the doctor still compares scores.
+    let scene = Scene::new().with("--symmetries", "symmetries.json");
+    let axis = json!({"axis": [0, 0, 1], "offset": [5000, 0, 0]});
+    let info = json!({"1": {"diameter": 100, "symmetries_continuous": [axis]}});
+    scene.write("symmetries.json", info.to_string());
+    let (text, json) = examine(&scene);
+    assert!(text.starts_with("no fault found (score 0."), "{text}");
+    let warnings = json["warnings"].to_string();
+    assert_contains(&warnings, &["symmetries.json: a declared symmetry moves"]);
 }
 
 #[test]
