@@ -4,7 +4,7 @@ mod advice;
 mod compare;
 mod estimate;
 mod eval;
-pub(crate) mod faults;
+mod faults;
 mod follow;
 mod generate;
 mod models;
@@ -12,9 +12,10 @@ mod options;
 mod refine;
 mod sequence;
 mod show;
-pub(crate) mod statistics;
+mod statistics;
 mod targets;
 mod track;
+pub(crate) mod tracking;
 
 use clap::Subcommand;
 

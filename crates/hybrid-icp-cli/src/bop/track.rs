@@ -9,8 +9,8 @@ use serde_json::json;
 
 use super::follow::FollowOptions;
 use super::models;
+use super::tracking::{Line, Rate};
 use crate::terminal::{counted, progress_bar};
-use crate::track::steps::{Line, Rate};
 
 /// Track a moving object through the images of a scene, without masks.
 ///

@@ -22,11 +22,11 @@ use self::tracker::Tracker;
 use super::advice::{advice, is_about_diameter};
 use super::follow::FollowOptions;
 use super::statistics::{count, median};
+use super::tracking::distrust;
 use super::{faults, models};
 use crate::choice::{Pipeline, PipelineArguments};
 use crate::limits::limits;
 use crate::terminal::{counted, progress_bar, warn};
-use crate::track::steps::distrust;
 
 /// Follow one object through a scene, fusing the estimates of its images (§V).
 ///

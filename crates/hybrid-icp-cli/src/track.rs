@@ -1,6 +1,4 @@
-//! `hybrid-icp track`, and the steps that it shares with `hybrid-icp bop track`.
-
-pub(crate) mod steps;
+//! `hybrid-icp track`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +10,7 @@ use hicp_io::{CameraFile, LengthUnit};
 use hybrid_icp::checks::warnings_of_model;
 use serde_json::json;
 
-use self::steps::{Image, Rate};
+use crate::bop::tracking::{Image, Rate};
 use crate::limits::limits;
 use crate::options::{file_name, positive};
 use crate::outputs::Files;

@@ -12,8 +12,8 @@ use hybrid_icp::core::{DepthImage, Isometry3, Model, PinholeCamera};
 use hybrid_icp::{TrackState, Tracked, Tracker, TrackerConfig};
 use serde_json::{Value, json};
 
-use crate::bop::faults;
-use crate::bop::statistics::{count, median};
+use super::faults;
+use super::statistics::{count, median};
 use crate::options::positive;
 use crate::pose_json::add_pose;
 use crate::terminal::warn;
