@@ -83,10 +83,8 @@ pub mod presets;
 mod refiner;
 mod registered;
 mod sequential;
-mod sequential_step;
 mod trace;
 mod tracker;
-mod undetermined;
 mod warning;
 
 pub use hicp_association as association;
@@ -111,9 +109,9 @@ pub use diagnosis::{Diagnosis, Fault, Finding};
 pub use hicp_icp::BoxedStage;
 pub use preset::Preset;
 pub use refiner::{Refinement, Refiner};
-pub use sequential::SequentialEstimator;
-pub use sequential_step::{
-    MotionCheck, SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs,
+pub use sequential::{
+    MotionCheck, SequentialConfig, SequentialEstimator, SequentialEvent, SequentialStep,
+    WithoutPairs,
 };
 pub use trace::{StageRecord, Trace};
 pub use tracker::{TrackError, TrackState, Tracked, Tracker, TrackerConfig};

@@ -1,5 +1,8 @@
 //! Sequential ICP: estimates fused while the camera moves (§V).
 
+mod step;
+mod undetermined;
+
 use hicp_core::{Isometry3, Matrix6, Model, Observation, Problem};
 use hicp_fusion::{
     BoxedFuser, CameraMotion, CovarianceModel, Fuser, FuserConfig, FusionError, FusionMethod, Gate,
@@ -13,8 +16,11 @@ use hicp_raster::Rasterizer;
 use hicp_score::{MeanVsd, Score};
 
 use crate::calibration::Calibration;
-use crate::sequential_step::{SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs};
-use crate::undetermined::Undetermined;
+use crate::sequential::undetermined::Undetermined;
+
+pub use crate::sequential::step::{
+    MotionCheck, SequentialConfig, SequentialEvent, SequentialStep, WithoutPairs,
+};
 
 // Deviation: window: §V fuses all estimates, so that each step takes longer than the one before.
 // `SequentialEstimator::for_object` and `calibrated` fuse the newest 100,
