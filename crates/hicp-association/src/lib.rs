@@ -12,6 +12,8 @@
 //!
 //! fn gated_pairs(context: &mut Context<'_>, source: &[Surfel], pose: &Isometry3<f64>) -> Correspondences {
 //!     let mut pairs = Correspondences::new();
+//!     // An association only adds pairs: the caller stores the pose and the number of candidates.
+//!     pairs.begin(pose, source.len());
 //!     Projective.associate(context, source, pose, &mut pairs);
 //!     let problem = context.problem;
 //!     let filter = &mut (MaxDistance::diameters(0.25), MaxNormalAngle::degrees(60.0));
@@ -33,7 +35,7 @@
 //! | [`RandomSample`] | [`ProjectiveSearch`] | [`OneToOne`] | |
 //! | [`VoxelGrid`] | [`ProjectiveInterpolated`] | [`BoundaryTargets`] | |
 //! | [`NormalSpace`] | [`ObservationToModel`] | [`MinPairs`] | |
-//! | [`StableSampling`] | [`ClosestPointOnMesh`] | | |
+//! | [`StableSampling`] | [`ClosestPointOnMesh`] | [`Schedule`] | |
 //! | | [`RenderedSurface`] | | |
 //! | | [`Contour`] | | |
 //!

@@ -11,9 +11,9 @@ use crate::surfel::Surfel;
 
 /// A point cloud with normals, organized or not: the source or the target of a registration.
 ///
-/// It is immutable, in meters, in a frame of its own. Scanners and depth cameras put the origin of
-/// that frame at the sensor; nothing here requires it. Share a cloud between threads and runs,
-/// because search trees are built once per cloud, see [`Cloud::derived`].
+/// It is immutable, in meters, in any frame. Scanners and depth cameras put the origin of that
+/// frame at the sensor; nothing here requires it. Share a cloud between threads and runs, because
+/// search trees are built once per cloud, see [`Cloud::derived`].
 ///
 /// ```
 /// use hicp_core::{Cloud, Point3, Surfel, Vector3};
@@ -43,10 +43,10 @@ impl Cloud {
         })
     }
 
-    /// Creates a cloud without normals, which must be the source of a metric that does not use
-    /// them, such as point-to-point or point-to-plane.
+    /// Creates a cloud without normals, for metrics that do not use them.
     ///
-    /// Its normals are NaN, so that another metric or filter finds no step or no pairs. Skips
+    /// Point-to-point uses no normals, and point-to-plane only those of the target. The normals of
+    /// the cloud are NaN, so other metrics and filters on normals give no step or no pairs. Skips
     /// points as [`Cloud::new`] does.
     pub fn without_normals(points: impl IntoIterator<Item = Point3<f32>>) -> Self {
         let normal = UnitVector3::new_unchecked(Vector3::repeat(f32::NAN));
@@ -54,10 +54,10 @@ impl Cloud {
         Self::with_some_normals(surfels).with_normals_from(0)
     }
 
-    /// Creates a cloud in which points without a normal have one of NaN, for a metric that does not
-    /// use normals.
+    /// Creates a cloud from surfels of which some may have a normal of NaN.
     ///
-    /// Skips points that are not finite, or beyond [`MAX_COORDINATE_METERS`].
+    /// [`Cloud::new`] skips points without a normal. Use this for metrics without normals, which
+    /// can use such points. Skips points that are not finite, or beyond [`MAX_COORDINATE_METERS`].
     pub fn with_some_normals(surfels: impl IntoIterator<Item = Surfel>) -> Self {
         Self::of(surfels, |_| true)
     }

@@ -4,7 +4,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, UnitVector3, Vector3};
 
 use crate::surfel::Surfel;
 
-/// One correspondence (cᵢ, nᵢ, oᵢ, mᵢ) of Algorithm 1, in the camera frame at the current estimate.
+/// One correspondence (cᵢ, nᵢ, oᵢ, mᵢ) of Algorithm 1, in the camera frame, meters.
+///
+/// Between two clouds, the camera frame is the frame of the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
     /// The model point T_CO oᵢ, moved by the current estimate, and its normal R_CO mᵢ.
@@ -13,14 +15,17 @@ pub struct Pair {
     pub target: Surfel,
     /// Weight, not negative.
     pub weight: f32,
-    /// The index of the source element; equal indices mean the same element.
+    /// The index of the source element.
     ///
-    /// It is an index into the selection. For an association that starts from the observation, it
-    /// is an index into the model's elements. To look up data of model or cloud points behind a
-    /// selection, search by position with `hicp_association::PointSearch`.
+    /// It is an index into the selected points. An association that does not start from them has
+    /// its own numbering: of samples, of triangles, or of the pixels of the rendered region. To
+    /// look up data of the model or cloud point, search by position with
+    /// `hicp_association::PointSearch`.
     pub source_index: u32,
-    /// The index of the target element: row-major in the observation's region, see
-    /// [`Observation::surfel`](crate::Observation::surfel). [`Pair::UNLISTED`] for other points.
+    /// The index of the observed surfel; [`Pair::UNLISTED`] if the target is another point.
+    ///
+    /// For an observation, it is that of [`Observation::surfel`](crate::Observation::surfel). For a
+    /// cloud, it is the position in [`Cloud::surfels`](crate::Cloud::surfels).
     pub target_index: u32,
 }
 

@@ -200,9 +200,10 @@ impl<'a> Problem<'a> {
         Some((self.model()?, self.observation()?))
     }
 
-    /// Returns the mesh that is rendered, if there is one.
+    /// Returns the mesh that is rendered, or `None` if the source is not a model.
     ///
-    /// It is that of [`Model::drawn`]. If the image has colors, it is a mesh that has some.
+    /// It is that of [`Model::drawn`]. If both the image and the mesh have colors, it is the mesh
+    /// itself, because a simplified mesh has no colors.
     #[must_use]
     #[inline]
     pub fn drawn(&self) -> Option<&'a TriMesh> {
@@ -216,13 +217,18 @@ impl<'a> Problem<'a> {
         Some(model.drawn())
     }
 
-    /// Returns `part` if the target is a cloud, for components that need a depth image.
+    /// Returns `part`, the name of a component that needs a depth image, if the target is a cloud.
+    ///
+    /// Components return it from their method `unsupported`. Returns `None` without a target.
     #[must_use]
     pub fn without_image(&self, part: &'static str) -> Option<&'static str> {
         matches!(self.target, Some(Target::Cloud(_))).then_some(part)
     }
 
-    /// Returns `part` if a side is a cloud, for components that need a mesh and a depth image.
+    /// Returns `part`, the name of a component that needs a mesh and an image, if a side is a
+    /// cloud.
+    ///
+    /// Components return it from their method `unsupported`. Returns `None` without sides.
     #[must_use]
     pub fn without_mesh_or_image(&self, part: &'static str) -> Option<&'static str> {
         let mesh = !matches!(self.source, Some(Source::Cloud(_)));

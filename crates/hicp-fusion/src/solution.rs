@@ -8,7 +8,7 @@ use crate::estimate::PoseEstimate;
 pub struct FusionLimits {
     /// Largest number of evaluations of the cost.
     pub max_iterations: usize,
-    /// Length |ε| of a step below which it is the last, in meters and radians together.
+    /// Norm |ε| of a step, in meters and radians, below which the solver has converged.
     pub tolerance: f64,
 }
 
@@ -27,7 +27,7 @@ impl Default for FusionLimits {
     }
 }
 
-/// The result of an iteration.
+/// The convergence report of an iterative fusion: evaluations, cost, and whether it converged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -73,6 +73,6 @@ pub struct Fused {
     /// Its covariance is A⁻¹ at the minimum (Laplace). It is valid if the covariances of the
     /// estimates are right and their errors independent.
     pub estimate: PoseEstimate,
-    /// The result of the iteration.
+    /// The convergence of the solver.
     pub solution: Solution,
 }

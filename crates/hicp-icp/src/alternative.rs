@@ -2,7 +2,7 @@
 
 use hicp_core::Isometry3;
 
-/// A pose that a search found besides the one it returned.
+/// A pose that a search found in addition to the one that it returned.
 ///
 /// It differs from the returned pose, and from other alternatives, by an MSSD of more than a tenth
 /// of the diameter. MSSD and angle are up to declared symmetries.

@@ -1,8 +1,18 @@
 //! The ICP engine: the trait [`Stage`], generic ICP, stop rules, and stages made of stages.
 //!
-//! Generic ICP is [`Icp`], Algorithm 1 of the paper. Its stop rules can reject a candidate, so that
-//! a stage returns the pose before it. An [`Observer`] receives iterations, choices of switchers,
-//! decisions about scored poses, and ends of stages.
+//! - **Generic ICP** is [`Icp`], Algorithm 1 of the paper.
+//! - **Composition**: [`Cascade`] and [`Repeat`] run stages in sequence. [`Guard`] and [`KeepBest`]
+//!   keep a pose only if a score improves. [`AtResolution`] runs a stage on fewer pixels, and
+//!   [`Anderson`] accelerates one.
+//! - **Other refiners**: [`Descent`] lowers a score directly. [`RayShift`] is the baseline that
+//!   shifts the object along its ray.
+//! - **Search**: [`HypothesisSearch`] tries other poses, [`ColorChoice`] lets color decide among
+//!   them, and [`LookAlikeCount`] counts those that depth cannot tell apart.
+//! - **Stop rules**: [`Divergence`], [`Convergence`], [`AbsoluteLoss`], [`SmallMotion`], [`Bound`],
+//!   [`Oscillation`], [`IterationLimit`], [`TimeLimit`] and [`Deadline`]. A rule can reject a
+//!   candidate, so that a stage returns the pose before it.
+//! - **Observers**: an [`Observer`] receives iterations, choices of switchers, decisions about
+//!   scored poses, and ends of stages.
 //!
 //! **Should you use this crate?** Yes, to compose an ICP variant without the presets. To refine
 //! poses with one call, use `hybrid-icp`.

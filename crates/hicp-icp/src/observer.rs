@@ -138,9 +138,10 @@ impl<'a> IterationEvent<'a> {
     }
 }
 
-/// The branch of a switch, counted from 0.
+/// The regime of a pose: the index of the branch that a switch runs, from 0.
 ///
-/// The better the estimate agrees with the image, the lower its branch.
+/// The better the pose agrees with the image, the lower the regime. The paper has two,
+/// [`Regime::ALIGNED`] and [`Regime::MISALIGNED`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Regime(pub usize);

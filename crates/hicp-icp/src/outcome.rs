@@ -30,7 +30,7 @@ pub enum Termination {
     Deadline,
     /// The observer requested the stop. The last accepted pose is returned.
     Stopped,
-    /// No stage ran, for example because a cascade is empty or the pose was only judged.
+    /// No stage ran, because a cascade is empty or a pose was only scored (`Refiner::judge`).
     Kept,
     /// A guard's score did not improve.
     ScoreNotImproved,
@@ -262,7 +262,10 @@ impl Verdict {
 pub struct Outcome {
     /// The pose `camera_from_object`.
     pub camera_from_object: Isometry3<f64>,
-    /// The reason why the stage ended; for a composed stage, the reason of its last part.
+    /// The reason why the stage ended.
+    ///
+    /// For a composed stage, it is that of the last stage that did not end as
+    /// [`Termination::Kept`].
     pub termination: Termination,
     /// New pose, or initial pose with the reason.
     pub verdict: Verdict,

@@ -51,16 +51,22 @@ impl Workspace {
         self.renders.view(model, camera, camera_from_object)
     }
 
-    /// The pairs of the last iteration of the last [`Icp`](crate::Icp).
+    /// The pairs at the pose that the last [`Icp`](crate::Icp) returned.
+    ///
+    /// If its last candidate was rejected, the pairs are those of the pose accepted before. The
+    /// list is empty if there were no pairs at the initial pose. It does not change if the stage
+    /// could not run ([`Termination::Unsupported`](crate::Termination::Unsupported)).
     #[must_use]
     pub fn pairs(&self) -> &Correspondences {
         &self.pairs
     }
 
-    /// The distinct other poses that the last search found, best first.
+    /// The distinct other poses that the last search or choice by color found, best first.
     ///
-    /// A [`HypothesisSearch`](crate::HypothesisSearch) writes them. Other stages leave them as they
-    /// are.
+    /// A [`HypothesisSearch`](crate::HypothesisSearch) replaces the list. A
+    /// [`ColorChoice`](crate::ColorChoice) adds poses, and moves those that color does not tell
+    /// apart to the front. Other stages do not change it, so clear it before a run without a
+    /// search.
     #[must_use]
     pub fn alternatives(&self) -> &[Alternative] {
         &self.alternatives

@@ -61,10 +61,10 @@ impl Default for RasterConfig {
 ///
 /// Beyond the contract of [`Renderer`]:
 ///
-/// - The requested region is clipped to the image. The view is then reset to its pixels whose
-///   centers lie in the bounding box of all projected vertices, used or not. If only some vertices
-///   lie beyond the near plane, it keeps the clipped region. Without any, it is an empty region at
-///   the origin.
+/// - The requested region is clipped to the image. The view is then reset to those of its pixels
+///   whose centers lie in the bounding box of all projected vertices, used or not. If some vertices
+///   are nearer than the near plane, the view has the whole clipped region. If all of them are, the
+///   view is an empty region at the origin.
 /// - The id of a pixel is the index of its triangle in [`TriMesh::triangles`]. Of several triangles
 ///   at the same depth, it is the first.
 /// - Depth agrees with the intersection of the ray to two roundings to `f32`, 1.2·10⁻⁷ of its

@@ -4,11 +4,12 @@
 //!   [`SampledMve`] ranks many poses, and [`Vsd`] compares with a known true pose.
 //! - [`Evidence`]: what agrees with a pose, what contradicts it, and how well the mask fits.
 //! - [`Confidence`]: the probability that a pose is right, from the evidence and its [`Misfit`].
+//!   [`Doubt`] is 1 minus that probability, as a score.
 //! - [`ColorAgreement`]: compares colors, and returns how strong their evidence is.
 //!   [`SampledColor`] ranks many poses.
 //! - [`Flatness`]: recognizes a wall in the mask.
 //! - [`bop_vsd`], [`mssd`], [`mspd`], [`add`], [`adi`], [`Recalls`]: errors and recalls of the BOP
-//!   benchmark.
+//!   benchmark. [`ModelPoints`] prepares a model for many pairs of poses.
 //! - [`roc_area`], [`reliability`]: the separation of correct poses from wrong ones by a score.
 //!
 //! **Should you use this crate?** Yes, to judge poses from any source, with or without ground

@@ -5,7 +5,7 @@ use hicp_icp::{Outcome, Regime, Session, Stage, Termination};
 
 use crate::switcher::Switcher;
 
-/// Runs one of two stages, selected from the image at the initial estimate.
+/// Runs one of two stages, selected from the image at the initial pose.
 ///
 /// It is one iteration of Hybrid ICP (§IV-C). Any regime but [`Regime::ALIGNED`] counts as
 /// misaligned; [`SwitchAmong`] accepts more than two.
@@ -43,7 +43,7 @@ impl<W: Switcher, A: Stage, M: Stage> Stage for Switch<W, A, M> {
     }
 }
 
-/// Runs one of any number of stages, selected from the image at the initial estimate.
+/// Runs one of any number of stages, selected from the image at the initial pose.
 ///
 /// Regime k runs the k-th stage, and regimes beyond the last stage run the last one. Without
 /// stages, it keeps the initial pose.

@@ -4,9 +4,14 @@ use hicp_core::internal::type_label;
 use hicp_core::{Context, Isometry3, Problem};
 use hicp_icp::{Regime, RegimeEvent};
 
-/// Selects the regime of the current estimate from the image (Dynamic Switching, §IV-A).
+/// Selects the regime of a pose from the image (Dynamic Switching, §IV-A).
 ///
-/// It is pure: equal inputs give equal results, and `&mut self` is scratch.
+/// A switch calls it at the initial pose, before it runs a stage, so the image decides which
+/// registration can succeed. The result includes the score that decided, if there is one. Observers
+/// report it, and [`SwitchUntilStall`](crate::SwitchUntilStall) keeps the pose with the lowest
+/// score. Without a score, that stage keeps its initial pose.
+///
+/// Pure: equal inputs give equal results. `&mut self` is scratch.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a switcher",
     label = "this must implement `Switcher`",
@@ -25,10 +30,11 @@ pub trait Switcher {
         type_label::<Self>()
     }
 
-    /// Returns the name of the part that cannot work on a problem, such as a projection between
-    /// point clouds.
+    /// Returns the name of the component that does not support a problem, or `None`.
     ///
-    /// A stage then ends with that name before it runs. The provided method returns `None`.
+    /// For example, a projection needs a depth image and does not support two point clouds. A stage
+    /// ends with `Termination::Unsupported` and this name before its first iteration. A component
+    /// around another one forwards the call. The provided method returns `None`.
     fn unsupported(&self, _problem: &Problem<'_>) -> Option<&'static str> {
         None
     }
@@ -57,7 +63,7 @@ macro_rules! forward {
 }
 forward!(Box<T>, &mut T);
 
-/// Selects always the same regime, which disables Dynamic Switching.
+/// Always selects this regime, which disables Dynamic Switching.
 impl Switcher for Regime {
     fn regime(&mut self, _: &mut Context<'_>, _: &Isometry3<f64>) -> RegimeEvent {
         RegimeEvent {

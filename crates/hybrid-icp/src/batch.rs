@@ -10,7 +10,7 @@ use hicp_icp::Stage;
 
 use crate::refiner::{Refinement, Refiner};
 
-/// Refines many poses on several threads, each with a refiner of its own.
+/// Refines many poses on several threads, with one refiner per thread.
 ///
 /// An item is a model, an observation and the initial pose (`camera_from_object`, meters). Models
 /// and observations may repeat: their search trees are built once. `threads` is the number of

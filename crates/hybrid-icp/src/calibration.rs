@@ -20,9 +20,9 @@ pub struct Calibration {
     pub scale: f64,
     /// Smallest standard deviation of an estimate, without the shared error.
     pub floor: f64,
-    /// Standard deviation at an MVE of 1, by the growth of `mve_power`.
+    /// Standard deviation at an MVE of 1, in units of the object.
     pub mve_gain: f64,
-    /// Exponent of its growth with the MVE.
+    /// Exponent p: the standard deviation is `mve_gain` times the p-th power of the MVE.
     pub mve_power: f64,
     /// Standard deviation if neither the registration nor a fit at its pose has a covariance.
     pub undetermined: f64,
@@ -31,12 +31,12 @@ pub struct Calibration {
     /// ν of Student's distribution of the errors; ∞ for normal errors. See
     /// [`Calibration::probability_within`].
     pub degrees_of_freedom: f64,
-    /// Estimates that are not fused.
+    /// The conditions that an estimate must meet to be fused.
     pub gate: Gate,
 }
 
 impl Calibration {
-    /// Fitted to `hybrid`.
+    /// The factors fitted to the preset `hybrid`.
     pub const HYBRID: Self = Self {
         scale: 1.0,
         floor: 0.003,
@@ -52,15 +52,17 @@ impl Calibration {
         },
     };
 
-    /// Fitted to `projective-cascade-point-plane`.
+    /// The factors fitted to the preset `projective-cascade-point-plane`.
     pub const PROJECTIVE_CASCADE_POINT_PLANE: Self = Self {
         mve_gain: 18.0,
         mve_power: 4.4,
         ..Self::HYBRID
     };
 
-    /// Returns the factors that were fitted to a preset; those of `hybrid` for all but the two
-    /// above.
+    /// Returns the factors for a preset.
+    ///
+    /// Two presets have fitted factors, `hybrid` and `projective-cascade-point-plane`. For every
+    /// other preset, they are those of `hybrid`.
     ///
     /// Factors fitted to `auto` differ by a tenth in the shared error and by a third in the growth
     /// with the MVE.

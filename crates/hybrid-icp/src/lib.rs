@@ -39,12 +39,12 @@
 //! # let _ = refiner;
 //! ```
 //!
-//! Parts with scratch memory have private fields, so `..Default::default()` does not complete them.
-//! Create them with `new` or `default` and set their public fields.
+//! Components with scratch memory have private fields, so `..Default::default()` does not complete
+//! them. Create them with `new` or `default` and set their public fields.
 //!
-//! # Parts by role
+//! # Components by role
 //!
-//! Every role is a trait. The last column names the example to copy for a custom part, in the
+//! Every role is a trait. The last column names the example to copy for a custom component, in the
 //! folder `examples` of this crate.
 //!
 //! | role | trait | what ships | example |
@@ -63,7 +63,7 @@
 //! | observes a run | [`Observer`](icp::Observer) | [`Trace`] | `04_observer` |
 //!
 //! With the feature `pipeline`, which is on by default, the module `pipeline` reads the same
-//! compositions from TOML files. `hicp-testkit` checks custom parts against the laws of their
+//! compositions from TOML files. `hicp-testkit` checks custom components against the laws of their
 //! trait.
 //!
 //! # Conventions
@@ -119,8 +119,8 @@ pub use warning::{CenterFault, Warning};
 
 /// The names that refine a pose and compose the paper's pipeline: `use hybrid_icp::prelude::*;`.
 ///
-/// Everything else is in the modules. Traits of custom parts are in the modules of
-/// [their roles](crate#parts-by-role).
+/// Everything else is in the modules. Traits of custom components are in the modules of [their
+/// roles](crate#components-by-role).
 pub mod prelude {
     pub use crate::{Preset, Refinement, Refiner, presets};
     pub use hicp_association::{

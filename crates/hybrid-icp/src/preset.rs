@@ -11,12 +11,19 @@ use crate::presets;
 /// Declares the presets: per line the variant, the name, the function in [`presets`], a summary.
 macro_rules! declare {
     ($($variant:ident, $name:literal, $function:ident, $summary:literal;)*) => {
-        /// A pipeline that ships with the library: Hybrid ICP or one of the eight baselines, by its
-        /// name in the paper, or one that goes beyond it.
+        /// A pipeline that ships with the library.
+        ///
+        /// Use [`Preset::Auto`], the default, unless you have a reason not to. [`Preset::Local`]
+        /// never searches, [`Preset::Search`] searches sooner, and [`Preset::Color`] also compares
+        /// colors. The first nine are Hybrid ICP and the eight baselines of the paper, by their
+        /// names there.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[non_exhaustive]
         pub enum Preset {
-            $(#[doc = concat!("[`presets::", stringify!($function), "`].")] $variant,)*
+            $(
+                #[doc = concat!($summary, ". See [`presets::", stringify!($function), "`].")]
+                $variant,
+            )*
         }
 
         impl Preset {
@@ -29,14 +36,16 @@ macro_rules! declare {
                 match self { $(Self::$variant => $name,)* }
             }
 
-            /// Returns one line about it.
+            /// Returns a one-line description.
             #[must_use]
             pub fn summary(self) -> &'static str {
                 match self { $(Self::$variant => $summary,)* }
             }
 
-            /// Returns the pipeline as a file: what `PipelineFile` builds from it gives the same
-            /// bits as [`Preset::build`].
+            /// Returns the pipeline as the text of a TOML file.
+            ///
+            /// The stage that `PipelineFile` builds from it gives the same bits as
+            /// [`Preset::build`].
             #[must_use]
             pub fn toml(self) -> &'static str {
                 match self {

@@ -31,9 +31,10 @@ pub struct Refinement {
     ///
     /// Equal to [`Self::mve`] if there was no initial pose ([`Refiner::estimate`]).
     pub mve_initial: f64,
-    /// The mean VSD estimate of the returned pose.
+    /// The mean VSD estimate of the returned pose, by the default [`MeanVsd`].
     ///
-    /// Above `mve_initial`, the refinement made the pose worse.
+    /// Presets such as `auto` lower another MVE ([`MeanVsd::imperfect_mask`]), so this one may rise
+    /// a little. A rise above `mve_initial` of more than 0.01 is a warning ([`Warning::Worse`]).
     pub mve: f64,
     /// The probability that the returned pose is right, 0 to 1 ([`Confidence`]).
     ///
@@ -173,8 +174,11 @@ impl<S: Stage> Refiner<S> {
     /// Refines a pose (`camera_from_object`, meters).
     ///
     /// Never fails on data: without overlap, or with degenerate geometry, the outcome has the
-    /// initial pose and states the reason. Deterministic. Cost: that of the pipeline, and one
-    /// render for the final score.
+    /// initial pose and states the reason. Deterministic, unless the stage has a time limit.
+    ///
+    /// Cost: that of the pipeline, the scores of the initial and the returned pose, and the count
+    /// of look-alikes ([`LookAlikeCount::at`](hicp_icp::LookAlikeCount::at)). If no stage evaluated
+    /// the returned pose, one iteration of the refiner's own fit is added.
     pub fn refine(
         &mut self,
         model: &Model,
@@ -345,8 +349,8 @@ impl<S: Stage> Refiner<S> {
     /// Returns the distinct other poses that the last run found, best first.
     ///
     /// Two poses are distinct if their MSSD, up to declared symmetries, is above a tenth of the
-    /// diameter. Only a search finds other poses: the presets `auto` and `search`, and
-    /// [`Self::estimate`].
+    /// diameter. Only a search or a choice by color finds other poses: the presets `search`, `auto`
+    /// and `color`, and [`Self::estimate`].
     #[must_use]
     pub fn alternatives(&self) -> &[Alternative] {
         self.workspace.alternatives()

@@ -52,7 +52,7 @@ pub enum Warning {
         /// Diameter of the model.
         diameter: f64,
     },
-    /// The intrinsics are hardly those of the image.
+    /// The principal point is so far from the middle of the image that the intrinsics are doubtful.
     #[error("the principal point ({cx}, {cy}) {fault}")]
     Center {
         /// Column of the principal point, pixels.

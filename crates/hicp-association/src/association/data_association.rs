@@ -8,8 +8,9 @@ use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
 /// # Contract
 ///
 /// - `source` holds the selected surfels in the object frame.
-/// - Pairs are added after those that `pairs` already holds, which do not change. A join of
-///   associations leaves the pairs of its earlier members there.
+/// - The caller calls [`Correspondences::begin`] first, which removes all pairs and stores the pose
+///   and the number of source points. An association only adds pairs. It does not change those that
+///   are already there, such as the pairs of an earlier member of a tuple.
 /// - Every pair holds the source *moved by* `camera_from_object` and its target. Both are in the
 ///   camera frame in meters, with finite coordinates.
 /// - The weight of a pair is finite and not negative: 1, unless the association has a better value.
@@ -62,7 +63,7 @@ use hicp_core::{Context, Correspondences, Isometry3, Problem, Surfel};
     note = "`Icp::association` accepts a `DataAssociation`, such as `Projective`, a tuple of two to eight, or a `Vec`"
 )]
 pub trait DataAssociation {
-    /// Fills `pairs` at the candidate pose `camera_from_object`.
+    /// Adds the pairs at the candidate pose `camera_from_object` to `pairs`.
     fn associate(
         &mut self,
         context: &mut Context<'_>,
@@ -76,10 +77,11 @@ pub trait DataAssociation {
         type_label::<Self>()
     }
 
-    /// Returns the name of the part that cannot work on a problem, such as a projection between
-    /// point clouds.
+    /// Returns the name of the component that does not support a problem, or `None`.
     ///
-    /// A stage then ends with that name before it runs. The provided method returns `None`.
+    /// For example, a projection needs a depth image and does not support two point clouds. A stage
+    /// ends with `Termination::Unsupported` and this name before its first iteration. A component
+    /// around another one forwards the call. The provided method returns `None`.
     fn unsupported(&self, _problem: &Problem<'_>) -> Option<&'static str> {
         None
     }

@@ -9,16 +9,17 @@ use crate::stride::Stride;
 
 /// Pairs every rendered point with the point that the camera measured along the same ray.
 ///
-/// Use it with the metric `PointToPlane` and the selection `()`. The target of a pair carries the
-/// normal of the *model*, and weights are t² / cos² θ, where θ is the angle between the ray and
-/// that normal. A row is then the error of depth along the ray, whose Jacobian has no noise.
+/// Use it with the metric `PointToPlane` and the selection `()`. The target of a pair has the
+/// normal of the *model*. Its weight is b / cos² θ, where θ is the angle between the ray and that
+/// normal. A row is then the error along the ray, whose Jacobian has no noise.
 /// [`Projective`](crate::Projective) with point-to-plane uses the normals of the image instead,
 /// which are smoothed or noisy.
 ///
-/// The factor t falls from 1 to 0 at the limit (Tukey's biweight). The model is rendered at every
-/// iteration, so hidden parts never pair. Pixels outside of the mask pair, too: masks of detectors
-/// often miss a part of the object, and other surfaces are usually farther away than the limit. If
-/// fewer than three pixels are measured inside the mask, there are no pairs.
+/// The factor b = (1 − (d/limit)²)² of the difference d of the two depths is Tukey's biweight: it
+/// falls from 1 to 0 at the limit. The model is rendered at every iteration, so hidden parts never
+/// pair. Pixels outside of the mask pair, too: masks of detectors often miss a part of the object,
+/// and other surfaces are usually farther away than the limit. If fewer than three pixels are
+/// measured inside the mask, there are no pairs.
 ///
 /// `source` is ignored. `source_index` is the index of the pixel in the rendered region, and
 /// `target_index` is [`Pair::UNLISTED`]. So the normals of the image, which cost time, are not
@@ -36,7 +37,7 @@ pub struct RenderedSurface {
 impl Default for RenderedSurface {
     /// About 2,000 points, and at most 0.12 diameters.
     ///
-    /// With twice as much, a surface beside the object can pull a good pose away.
+    /// With twice as much, a surface next to the object can pull a good pose away.
     fn default() -> Self {
         Self {
             stride: Stride::AboutPoints(2000),

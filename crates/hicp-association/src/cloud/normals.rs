@@ -11,7 +11,7 @@ use crate::search::point_tree::PointTree;
 /// Ratio of the two smaller principal variances to the largest below which points lie on a line.
 const LINE: f64 = 1e-8;
 
-/// Estimates the normals of points from the plane through the `k` nearest ones, itself included.
+/// Estimates the normal of each point from a plane fit to its `k` nearest points, itself included.
 ///
 /// The normal is the direction of least variance (Hoppe et al. 1992). It faces the origin of the
 /// frame, where scanners and depth cameras put the sensor. It is `None` if the neighbors lie on a

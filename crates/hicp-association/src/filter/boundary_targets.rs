@@ -36,7 +36,8 @@ pub struct BoundaryTargets {
     pub width: u32,
     /// Largest tilt of a surface against the image plane, degrees. A steeper step is a depth edge.
     ///
-    /// From 90 on, nothing is. With NaN and negative values everything is, unless `width` is 0.
+    /// With 90 or more, no step is a depth edge. With NaN or a negative value, every step is,
+    /// unless `width` is 0.
     pub max_tilt_degrees: f64,
 }
 

@@ -5,11 +5,38 @@ use hicp_core::{Correspondences, Iteration, Problem};
 
 /// Removes or re-weights pairs (the third and fourth ICP components, §II).
 ///
+/// Rejection and weighting are one trait, so that both can be chained in any order. A removed pair
+/// lowers the number of pairs, which stop rules read, and the fitness. A pair of weight 0 has no
+/// influence on the step, but it still counts.
+///
 /// `()` keeps everything. A tuple of up to eight filters applies them in order, and so does a `Vec`
 /// of any length.
 ///
-/// A filter is pure given the iteration. If it changes from one iteration to the next, it reads
-/// [`Iteration::index`] and does not count its calls.
+/// # Contract
+///
+/// - Keeps the order of the pairs, their pose and the number of candidates. Weights stay finite and
+///   not negative.
+/// - Pure given the iteration. If it changes from one iteration to the next, it reads
+///   [`Iteration::index`] and does not count its calls: a stage passes an earlier iteration again
+///   after a rejected pose.
+///
+/// ```
+/// use hicp_association::OutlierFilter;
+/// use hicp_core::{Correspondences, Iteration};
+///
+/// /// Keeps pairs within a limit that halves with every iteration, down to 5 mm.
+/// struct Narrowing {
+///     first_meters: f32,
+/// }
+///
+/// impl OutlierFilter for Narrowing {
+///     fn filter(&mut self, iteration: &Iteration<'_>, pairs: &mut Correspondences) {
+///         let halvings = i32::try_from(iteration.index).unwrap_or(i32::MAX);
+///         let limit = (self.first_meters * 0.5_f32.powi(halvings)).max(0.005);
+///         pairs.retain(|pair| pair.distance() <= limit);
+///     }
+/// }
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an outlier filter",
     label = "this must implement `OutlierFilter`",
@@ -24,10 +51,11 @@ pub trait OutlierFilter {
         type_label::<Self>()
     }
 
-    /// Returns the name of the part that cannot work on a problem, such as a projection between
-    /// point clouds.
+    /// Returns the name of the component that does not support a problem, or `None`.
     ///
-    /// A stage then ends with that name before it runs. The provided method returns `None`.
+    /// For example, a projection needs a depth image and does not support two point clouds. A stage
+    /// ends with `Termination::Unsupported` and this name before its first iteration. A component
+    /// around another one forwards the call. The provided method returns `None`.
     fn unsupported(&self, _problem: &Problem<'_>) -> Option<&'static str> {
         None
     }

@@ -9,14 +9,15 @@ use crate::search::point_tree::PointTree;
 /// Finds the nearest of a set of points, exactly: for custom associations, filters and metrics.
 ///
 /// It is the tree of [`NearestNeighbor`](crate::NearestNeighbor). Points that are not finite are
-/// never found. Of equally near points, the first is found. To share it between threads and runs,
-/// store it in the `derived()` cache of a model, cloud or observation. Values there are found by
-/// type and key, so wrap it in a private type: under the same key, another component's
-/// `PointSearch` over other points would be found.
+/// never found. Of equally near points, the first is found.
 ///
-/// It also finds the data of the point behind a pair, such as a label or a color. A pair holds the
-/// moved point, which a selection may have copied or rendered. So search at its place in the
-/// object:
+/// To share it between threads and runs, store it in the `derived()` cache of a model, cloud or
+/// observation. The cache is keyed by type and number. Wrap the search in a private type, so that
+/// no other component can use the same key for other points.
+///
+/// It can also look up data of the model or cloud point of a pair, such as a label or a color. A
+/// pair holds the moved point, and its index may refer to a selection. Move the point back to the
+/// frame of the source, and search there:
 ///
 /// ```
 /// use std::sync::Arc;

@@ -5,11 +5,11 @@ use hicp_core::{Context, Isometry3, Point3, Problem, RigidTransform, Surfel, se3
 use crate::selection::point_selection::PointSelection;
 use crate::stride::Stride;
 
-/// Selects the observed surfels, moved into the object frame at the stage's initial estimate.
+/// Selects the observed surfels, moved into the object frame at the stage's initial pose.
 ///
 /// It is meant for custom associations that start from the observation and search the model.
 /// `source[i]` is the i-th surfel of [`hicp_core::Observation::surfels`] at this stride, moved by
-/// the inverse of the initial estimate. With an association that searches the observation, every
+/// the inverse of the initial pose. With an association that searches the observation, every
 /// point would find itself.
 ///
 /// If the estimate is not finite as `f32`, nothing is selected. Cost: O(pixels of the grid).

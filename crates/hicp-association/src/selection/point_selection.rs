@@ -5,11 +5,46 @@ use hicp_core::{Context, Isometry3, Problem, Surfel};
 
 /// Selects the model points oᵢ that a stage registers (the first of the five ICP components, §II).
 ///
-/// It is called once per stage run, at the stage's initial estimate. Points and normals are in the
-/// object frame, in meters. `source` is empty at the call. Selecting nothing is not an error: the
-/// stage then ends with "no pairs".
+/// It is called once per stage run, at the stage's initial pose, and not in every iteration. Only
+/// over the same points are the losses and the numbers of pairs of two iterations comparable, which
+/// stop rules need.
 ///
-/// A selection is pure: equal inputs give equal points, and `&mut self` is scratch.
+/// # Contract
+///
+/// - `source` is empty at the call. Its points and normals are in the object frame, in meters and
+///   finite; normals have unit length.
+/// - Selecting nothing is not an error. Unless the association starts from the observation, the
+///   stage then ends with "no pairs".
+/// - Pure: equal inputs give equal points. `&mut self` is scratch.
+/// - For a render at the pose, it uses [`Context::view`], which a score at the same pose shares.
+///
+/// ```
+/// use hicp_association::PointSelection;
+/// use hicp_core::{Context, Isometry3, Problem, Surfel};
+///
+/// /// Removes points of another selection that the camera sees at a grazing angle.
+/// struct NotGrazing<P>(P);
+///
+/// impl<P: PointSelection> PointSelection for NotGrazing<P> {
+///     fn select(
+///         &mut self,
+///         context: &mut Context<'_>,
+///         camera_from_object: &Isometry3<f64>,
+///         source: &mut Vec<Surfel>,
+///     ) {
+///         self.0.select(context, camera_from_object, source);
+///         let camera = camera_from_object.inverse().translation.vector.cast::<f32>();
+///         source.retain(|surfel| {
+///             let toward_camera = (camera - surfel.point.coords).normalize();
+///             surfel.normal.dot(&toward_camera) > 0.3
+///         });
+///     }
+///
+///     fn unsupported(&self, problem: &Problem<'_>) -> Option<&'static str> {
+///         self.0.unsupported(problem)
+///     }
+/// }
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a point selection",
     label = "this must implement `PointSelection`",
@@ -29,10 +64,11 @@ pub trait PointSelection {
         type_label::<Self>()
     }
 
-    /// Returns the name of the part that cannot work on a problem, such as a projection between
-    /// point clouds.
+    /// Returns the name of the component that does not support a problem, or `None`.
     ///
-    /// A stage then ends with that name before it runs. The provided method returns `None`.
+    /// For example, a projection needs a depth image and does not support two point clouds. A stage
+    /// ends with `Termination::Unsupported` and this name before its first iteration. A component
+    /// around another one forwards the call. The provided method returns `None`.
     fn unsupported(&self, _problem: &Problem<'_>) -> Option<&'static str> {
         None
     }

@@ -4,12 +4,13 @@ use hicp_core::{Context, Isometry3, Problem, Sides, Surfel};
 
 use crate::selection::point_selection::PointSelection;
 
-/// Selects what is seen of the model from the side that faces the camera at the current estimate,
-/// without a render ([`Sides`]).
+/// Selects the surface that is visible from the side facing the camera, without a render.
 ///
-/// The surfels are spread evenly over the image. The side is up to 20° away, so some may be hidden.
-/// It fits many alignments at low cost; [`VisibleSurface`](crate::VisibleSurface) is exact. A cloud
-/// has no sides. Cost: a copy of the surfels, and some 0.1 ms for the first pose of a side.
+/// The side is one of the precomputed [`Sides`] of the model, chosen at the stage's initial pose.
+/// Its surfels are spread evenly over the image. Its direction is up to 20° off, so some surfels
+/// may be hidden. Use it to align many hypotheses at low cost;
+/// [`VisibleSurface`](crate::VisibleSurface) is exact. Clouds are not supported. Cost: a copy of
+/// the surfels, and some 0.1 ms for the first pose of a side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VisibleSide {
     /// Approximate number of surfels on each side.

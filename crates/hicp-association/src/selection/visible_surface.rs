@@ -10,19 +10,21 @@ use crate::stride::Stride;
 /// The first stage of a cascade starts where the cascade starts, so for it both are the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SelectAt {
-    /// The stage's initial estimate: the second stage of a cascade pairs the surface that is
-    /// visible by then.
+    /// The initial pose of the stage.
+    ///
+    /// In a cascade, a later stage selects the surface that is visible after the stage before it.
     #[default]
     Stage,
-    /// The initial estimate of the innermost cascade that runs the stage. All stages of the cascade
-    /// then share one V_O and one render, as §III-A.1 and §IV-B can be read. Outside of a cascade,
-    /// it is the stage's own.
+    /// The initial pose of the innermost cascade that runs the stage.
+    ///
+    /// All stages of the cascade then share one V_O and one render, which is one reading of
+    /// §III-A.1 and §IV-B. Outside of a cascade, it is the initial pose of the stage.
     Cascade,
 }
 
-/// Selects the points of the model that are visible at an initial estimate.
+/// Selects the points of the model that are visible at an initial pose.
 ///
-/// They are the vertex map V_O of §III-A.1. The model is rendered at the initial estimate of the
+/// They are the vertex map V_O of §III-A.1. The model is rendered at the initial pose of the
 /// stage or of its cascade ([`SelectAt`]); if the score has rendered it already, the render comes
 /// from the cache. Every rendered pixel on a grid that starts at the image's corner becomes a
 /// surfel, with the normal of its face toward the camera. If the object is behind the camera or
@@ -36,7 +38,7 @@ pub struct VisibleSurface {
 }
 
 impl VisibleSurface {
-    /// Selects at the stage's initial estimate, with this spacing.
+    /// Selects at the stage's initial pose, with this spacing.
     #[must_use]
     pub const fn with_stride(stride: Stride) -> Self {
         Self {

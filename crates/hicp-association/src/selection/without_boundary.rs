@@ -10,7 +10,7 @@ use crate::selection::visible_surface::VisibleSurface;
 /// model.
 ///
 /// At such points a slight misalignment decides which surface a pixel shows, so projective pairs
-/// are wrong most often. The model is rendered at the stage's initial estimate (once, see
+/// are wrong most often. The model is rendered at the stage's initial pose (once, see
 /// [`Context::view`]). Each point is judged at the pixel that it projects to. It is removed if one
 /// of these conditions holds:
 ///
@@ -27,9 +27,10 @@ pub struct WithoutBoundary<P> {
     pub selection: P,
     /// Width of the boundary, pixels. Values above 64 count as 64.
     pub width: u32,
-    /// Largest tilt of a surface against the image plane, degrees. A steeper step is a depth step.
+    /// Largest tilt of a surface against the image plane, degrees. A steeper step is a depth edge.
     ///
-    /// From 90 on, nothing is. With NaN and negative values everything is, unless `width` is 0.
+    /// With 90 or more, no step is a depth edge. With NaN or a negative value, every step is,
+    /// unless `width` is 0.
     pub max_tilt_degrees: f64,
 }
 

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// The error for a name that nothing has.
+/// The error for an unknown name, such as that of a preset, with a suggestion.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "no {what} is named {found:?}{} The names are: {}",
@@ -10,13 +10,13 @@ use thiserror::Error;
     known.join(", ")
 )]
 pub struct UnknownName {
-    /// The kind of the values that have names, such as "pipeline".
+    /// The kind of name, such as "pipeline".
     pub what: &'static str,
     /// The name given.
     pub found: String,
-    /// The name nearest to it, if one is near.
+    /// The most similar known name, if one is similar.
     pub suggestion: Option<&'static str>,
-    /// All names.
+    /// All known names.
     pub known: Vec<&'static str>,
 }
 

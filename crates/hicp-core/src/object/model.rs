@@ -18,7 +18,8 @@ use crate::surfel::Surfel;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModelConfig {
-    /// Number of area-uniform surface samples, at most [`MAX_SAMPLES`](crate::MAX_SAMPLES).
+    /// Number of area-uniform surface samples, at most [`MAX_SAMPLES`](crate::MAX_SAMPLES); default
+    /// 1000.
     ///
     /// Between 300 and 3000, the number hardly affects the accuracy.
     pub samples: usize,
@@ -28,7 +29,8 @@ pub struct ModelConfig {
     pub diameter: Option<f64>,
     /// Declared symmetries.
     pub symmetries: Symmetries,
-    /// Number of triangles above which a simplified mesh is rendered ([`Model::drawn`]).
+    /// Number of triangles above which a simplified mesh is rendered ([`Model::drawn`]); default
+    /// 20,000.
     ///
     /// `usize::MAX` renders every mesh as it is.
     pub simplify_above: usize,

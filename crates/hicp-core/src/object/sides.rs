@@ -23,12 +23,12 @@ const SPECK: f32 = 1e-9;
 /// diameter.
 const FRONT: f32 = 0.05;
 
-/// The visible surfels of a model from [`Sides::COUNT`] sides.
+/// The surfels of a model that are visible from each of [`Sides::COUNT`] directions.
 ///
-/// They stand in for a render where thousands of poses are tried. The surfels of a side are spread
-/// evenly over the *image* of the object, from far away: a square grid covers the view, and each
-/// cell has one. So fewer of them leave a pixel empty than samples that are spread over the
-/// surface. Surfels behind other parts of the object are left out, such as the inside of a mug.
+/// They replace a render if thousands of poses are tried. A square grid covers the view of the
+/// object from far away, and each cell has one surfel. The surfels are therefore even in the
+/// *image* and not on the surface, and fewer of them are needed to cover every pixel. Hidden
+/// surfels are left out, such as those of the inside of a mug.
 ///
 /// ```
 /// use hicp_core::{Isometry3, Model, Point3, Sides, TriMesh};
@@ -66,10 +66,10 @@ impl Sides {
     /// Number of sides. Neighbors are some 30° apart.
     pub const COUNT: usize = 48;
 
-    /// Returns the sides of a model with about `count` surfels each, at most 100,000. They are
-    /// shared.
+    /// Returns the sides of a model with about `count` surfels each, at most 100,000.
     ///
-    /// Cost: sampling the surface once, and some 0.1 ms for each side that is asked for.
+    /// They are built once per model and count, and shared. Cost: sampling the surface once, and
+    /// some 0.1 ms for each side that is requested.
     #[must_use]
     pub fn of(model: &Model, count: usize) -> Arc<Self> {
         let count = count.min(MAX_SURFELS);

@@ -25,7 +25,7 @@ use crate::surfel::Surfel;
 /// it ends with "no pairs".
 ///
 /// Cost: building one counts the measured pixels inside the mask's bounding box. The surfels are
-/// estimated when they are first asked for, since some refinements never need a normal: 5 to 20 ns
+/// estimated when they are first requested, since some refinements never need a normal: 5 to 20 ns
 /// per pixel of the box, more with more depth edges. Pixels outside cost nothing, since the
 /// observations of one image share its depth (an `Arc`). Share an observation between threads and
 /// hypotheses, because surfels and search trees are built once per observation, see
@@ -249,7 +249,7 @@ impl Observation {
     ///
     /// The point of a pixel without a surfel has depth 0.
     ///
-    /// Loops that look up many surfels should ask for this slice once.
+    /// A loop that looks up many surfels should get this slice once.
     #[must_use]
     pub fn surfel_map(&self) -> &[Surfel] {
         &self.surfels_once().0

@@ -18,8 +18,9 @@ use crate::solution::Solution;
 /// - [`Fuser::propagate`] moves all held estimates to the next frame. [`Fuser::update`] accepts an
 ///   estimate in the current frame. [`Fuser::estimate`] returns the fused one there, or `None`
 ///   before the first update.
-/// - After one update, the fused estimate is that of the update, including its covariance, unless
-///   it was rejected.
+/// - After one accepted update, the fused estimate is that of the update, including its covariance
+///   and MVE. Only a fuser that adds to covariances, such as [`SharedError`](crate::SharedError),
+///   may differ.
 /// - A fuser never panics and never returns numbers that are not finite. Estimates and motions are
 ///   checked on creation.
 /// - Pure: equal calls since the last [`Fuser::reset`] give equal bits.

@@ -20,17 +20,19 @@ pub type BoxedFuser = Box<dyn Fuser + Send>;
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum FusionMethod {
-    /// [`LastEstimate`].
+    /// Returns the latest estimate ([`LastEstimate`]).
     LastEstimate,
-    /// [`BatchFuser::average`].
+    /// Fuses all estimates with equal weights ([`BatchFuser::average`]).
     Average,
-    /// [`BatchFuser::weighted_average`].
+    /// Fuses all estimates, weighted by their covariances ([`BatchFuser::weighted_average`]).
     WeightedAverage,
-    /// [`RecursiveFuser::filtering_constant`].
+    /// Fuses each estimate with the result before, with a unit covariance
+    /// ([`RecursiveFuser::filtering_constant`]).
     FilteringConstant,
-    /// [`RecursiveFuser::filtering`].
+    /// Fuses each estimate with the result before, with its own covariance
+    /// ([`RecursiveFuser::filtering`]).
     Filtering,
-    /// [`MostConfident`].
+    /// Returns the estimate with the lowest uncertainty so far ([`MostConfident`]).
     MostConfident,
 }
 
@@ -91,7 +93,7 @@ impl FusionMethod {
         )
     }
 
-    /// Builds the method.
+    /// Creates the fuser of this method.
     #[must_use]
     pub fn build(self, config: FuserConfig) -> BoxedFuser {
         match self {
@@ -105,7 +107,9 @@ impl FusionMethod {
     }
 }
 
-/// A way to fuse that is not tied to an object yet: a method of the paper, or any [`Fuser`].
+/// A value that becomes a fuser: a [`FusionMethod`], or any [`Fuser`].
+///
+/// Constructors accept it, so that a method can be built with options that follow from the object.
 ///
 /// ```
 /// use hicp_fusion::{Fuser, FuserConfig, FusionMethod, IntoFuser, LastEstimate, Transport};

@@ -54,10 +54,10 @@ const TIE: f64 = 1e-9;
 
 /// Returns the estimate with the lowest uncertainty so far (§V-A): `most-confident`.
 ///
-/// The uncertainty is det Σ, the size of the ellipsoid. Unlike the trace, it does not change with
-/// the camera's motion. For multiples of one matrix, it has the order of their factors. The
-/// covariance of a motion makes older estimates less certain than newer ones. Among equals, the
-/// newest is selected.
+/// The uncertainty is det Σ, the squared volume of the uncertainty ellipsoid up to a factor. Unlike
+/// the trace, it does not change with the camera's motion. If all covariances are multiples of one
+/// matrix, as with the MVE, the smallest factor wins. The covariance of a motion makes older
+/// estimates less certain than newer ones. Among equals, the newest is selected.
 #[derive(Clone, Debug, Default)]
 pub struct MostConfident(LastEstimate);
 

@@ -12,7 +12,10 @@ use crate::stage::stage_trait::Stage;
 /// It is a pattern search (Hooke & Jeeves 1961): every axis in turn, in both directions, with steps
 /// that halve when no axis helps. Unlike ICP, it uses everything that the score uses: pixels that
 /// the camera sees through, the border of the mask, and noisy pixels without their normals. It
-/// costs far more per step, so it runs only if the score is above a threshold.
+/// costs far more per step, so it runs only if the score is above [`Descent::good_enough`].
+///
+/// It also keeps the initial pose if its score is 1 or more, because such a pose shows no
+/// direction, or if the observation has no surface.
 ///
 /// **Contract**: the score of the returned pose is never above that of the initial one.
 ///

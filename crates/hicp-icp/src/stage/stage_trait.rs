@@ -91,18 +91,19 @@ pub trait Stage {
         session: &mut Session<'_>,
     ) -> Outcome;
 
-    /// Returns the time limit of a run, if the stage has one. A stage around one stage returns that
-    /// of the wrapped one.
+    /// Returns the time limit of a run, if the stage has one.
     ///
-    /// A search without an initial pose that ends with this stage has the same limit.
+    /// A stage around another one returns the limit of the inner stage. A caller that starts a
+    /// search with this stage as its last step uses the limit for the whole search. The provided
+    /// method returns `None`.
     fn time_limit(&self) -> Option<Duration> {
         None
     }
 
-    /// Returns the name of the stage, which a stage that decides gives to its
-    /// [`DecisionEvent`](crate::DecisionEvent)s.
+    /// Returns the name of the stage, for its [`DecisionEvent`](crate::DecisionEvent)s.
     ///
-    /// Other events do not have it: the end of an ICP stage has the names of its components.
+    /// Other events do not contain it: a [`StageEvent`](crate::StageEvent) has the names of the
+    /// components.
     fn name(&self) -> &'static str {
         type_label::<Self>()
     }

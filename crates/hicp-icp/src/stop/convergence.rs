@@ -10,13 +10,12 @@ use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 /// It is the rule "terminated early if the ICP loss converges" of §IV-B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Convergence {
-    /// Relative change of the mean loss, up or down, below which the stage has converged.
-    ///
-    /// The change is relative to the previous iteration.
+    /// Change of the mean loss, relative to the previous iteration, below which the stage has
+    /// converged; default 10⁻³.
     pub relative_change: f64,
-    /// Mean loss (m²) below which further iterations gain nothing.
+    /// Mean loss below which a change is rounding, m²; default 10⁻¹⁴.
     ///
-    /// It is the square of the resolution of `f32` at arm's length.
+    /// The default is the square of the resolution of `f32` at arm's length.
     pub negligible_loss: f64,
 }
 

@@ -9,7 +9,7 @@ use crate::stop::stop_rule::{Judgment, Progress, StopRule};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LossRule {
-    /// Every rise: the rule as written.
+    /// Every rise above [`Divergence::rise_tolerance`], with more pairs or without.
     #[default]
     Strict,
     /// A rise without more pairs. New pairs have large residuals, and finding them is progress.
@@ -37,7 +37,9 @@ pub struct Divergence {
 }
 
 impl Divergence {
-    /// The rules as the paper states them.
+    /// Creates the paper's rules, with a tolerance of 0.1 % for rule 3.
+    ///
+    /// Without the tolerance, a rise in the last digit would end nearly every stage as diverged.
     #[must_use]
     pub fn strict() -> Self {
         Self {

@@ -66,10 +66,10 @@ impl StopRule for TimeLimit {
     }
 }
 
-/// Ends every stage that runs at a moment: one deadline for a whole pipeline.
+/// Ends a stage at a fixed instant, so that a whole pipeline can share one deadline.
 ///
-/// Stages that start after it evaluate their initial pose once and return it. Results depend on the
-/// clock.
+/// The last evaluated pose is accepted. A stage that starts later evaluates its initial pose once
+/// and returns it. Results depend on the clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Deadline(pub Instant);
 

@@ -25,12 +25,12 @@ pub(crate) fn object_motion(
 
 /// Ends a stage as converged if the next increment would hardly move the object.
 ///
-/// Both its distance, that of the object's center, *and* its angle must be below their limits.
+/// The displacement of the object's center *and* the rotation angle must be below their limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmallMotion {
-    /// Distance, meters.
+    /// Largest displacement of the object's center, meters.
     pub translation_meters: f64,
-    /// Angle, degrees.
+    /// Largest rotation angle, degrees.
     pub rotation_degrees: f64,
 }
 

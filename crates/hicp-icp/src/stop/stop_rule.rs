@@ -53,6 +53,10 @@ impl Judgment {
 
 /// Decides after every evaluation whether the stage continues and whether the pose is accepted.
 ///
+/// Both decisions are one trait, because a rule that detects divergence must reject the pose that
+/// revealed it. The stage then returns the pose accepted before, at no cost. A rule with memory
+/// clears it in [`StopRule::start`], because one rule serves many runs.
+///
 /// A tuple of up to eight rules, or a `Vec` of any number, passes every iteration to all of them.
 /// The first rule that does not continue decides. `()` never ends a stage, which then runs until
 /// [`MAX_ITERATIONS`](crate::MAX_ITERATIONS).
@@ -63,19 +67,16 @@ impl Judgment {
 /// use hicp_core::Iteration;
 /// use hicp_icp::{Judgment, Progress, StopRule, Termination};
 ///
-/// /// Ends a stage once the model points are within a distance of their counterparts.
+/// /// Ends a stage once the points of every pair are within a distance of each other.
 /// #[derive(Debug)]
-/// struct CloseEnough {
-///     mean_loss: f64,
+/// struct AllClose {
+///     meters: f32,
 /// }
 ///
-/// impl StopRule for CloseEnough {
+/// impl StopRule for AllClose {
 ///     fn check(&mut self, _iteration: &Iteration<'_>, progress: &Progress<'_>) -> Judgment {
-///         if progress.current.mean_loss <= self.mean_loss {
-///             Judgment::Accept(Termination::Custom("close_enough"))
-///         } else {
-///             Judgment::Continue
-///         }
+///         let is_close = progress.pairs.iter().all(|pair| pair.distance() <= self.meters);
+///         Judgment::accept_if(is_close, Termination::Custom("all_close"))
 ///     }
 /// }
 /// ```

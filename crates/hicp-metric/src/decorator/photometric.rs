@@ -17,22 +17,22 @@ const LEAST_VARIANCE: f64 = 4.0;
 /// Stiffness against shading, relative to the number of samples. A plane has one normal.
 const STIFFNESS: f64 = 1e-3;
 
-/// Adds the colors to a metric, so that they decide where depth leaves a motion free:
-/// E = Σ w e / Σ w + λ² (1 − ρ²).
+/// Adds the colors of the image to a metric, to determine motions that depth leaves free.
 ///
-/// 1 − ρ² is the share of the contrast of the model's colors that the image does not explain. In
-/// each channel, samples of the model that the camera sees are compared with the image at their
-/// projections: r = m − α a − β − γᵀn, with the color m of the model, a of the image, and the
-/// normal n. The gain α, the offset β and the shading γ are those of the least squares fit, so
-/// exposure, white balance and a lamp do not matter. If the colors contradict the model, α is 0
-/// and nothing is pulled. The rows of the system are −α ∇a · ∂(u, v)/∂p. At the minimum over α, β
-/// and γ, they give the exact gradient. The covariance of the system is for the variance of the
-/// pairs alone.
+/// It minimizes E = Σ w e / Σ w + λ² (1 − ρ²). The first term is the mean loss of the inner metric.
+/// 1 − ρ² is the share of the contrast of the model's colors that the image does not explain. λ is
+/// a length, [`Photometric::weight_diameters`] times the diameter. In each channel, samples of the
+/// model that the camera sees are compared with the image at their projections: r = m − α a − β −
+/// γᵀn, with the color m of the model, a of the image, and the normal n. The gain α, the offset β
+/// and the shading γ are those of the least squares fit, so exposure, white balance and a lamp do
+/// not matter. If the colors contradict the model, α is 0 and nothing is pulled. The rows of the
+/// system are −α ∇a · ∂(u, v)/∂p. At the minimum over α, β and γ, they give the exact gradient. The
+/// covariance of the system is for the variance of the pairs alone.
 ///
 /// Source: the direct form of Park, Zhou & Koltun, "Colored Point Cloud Registration Revisited",
-/// 2017, combined with the light as in a correlation. Their form on point clouds takes the gradient
-/// of the colors on the tangent plane of a target. On an image, both gradients differ by a multiple
-/// of the normal only, which is the direction that point-to-plane determines; so there is one form.
+/// 2017. The fit of gain, offset and shading is added here. For point clouds, they use the gradient
+/// of the colors in the tangent plane of the target. It differs from the gradient in the image only
+/// along the normal, the direction that point-to-plane determines, so one form suffices.
 ///
 /// It is a [`Minimize`] and not an [`ErrorMetric`](crate::ErrorMetric), because the colors are not
 /// in the pairs: the pose is that of the pairs. Without a color image, a model with colors, enough

@@ -71,16 +71,17 @@ impl Prior {
 /// ξ = ln(T T₀⁻¹)^∨ is the deviation from the mean.
 ///
 /// σ (`sigma_meters`) is the standard deviation of a residual of weight 1. It gives both terms the
-/// unit m², and 1/σ² times the sum is the negative log posterior. N residuals count as N
-/// independent ones, which neighboring pixels are not. To give the prior its full influence,
-/// multiply σ by √(pixels per independent residual). The covariance of the system is that of the
-/// posterior at this σ, whatever the residuals are. Of nested priors, the outer one sets σ.
+/// unit m². The sum divided by 2σ² is the negative log posterior, up to a constant. All residuals
+/// count as independent, which those of neighboring pixels are not. To give the prior its full
+/// influence, multiply σ by √(pixels per independent residual). The covariance of the system is
+/// that of the posterior at this σ, whatever the residuals are. Of nested priors, the outer one
+/// sets σ.
 ///
 /// The prior is linearized with the inverse left Jacobian (Barfoot & Furgale 2014): ξ + 𝓙(ξ)⁻¹ δ.
 /// The step is that of Gauss–Newton, even for metrics with a closed form. Without information, it
 /// is the metric's own step, bit for bit. A strong prior leads to T₀ in one step. The mean loss is
-/// the sum divided by Σ w. Information about six components replaces missing rows, but not missing
-/// pairs.
+/// the sum divided by Σ w. A prior with information about all six components gives a step even from
+/// too few pairs, but not without any pair.
 ///
 /// [`Prior::AboutInitial`] reads the initial pose of the stage from [`Iteration::init`].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -44,16 +44,16 @@ impl Default for Scale {
 /// It uses iteratively reweighted least squares. A step multiplies the weight of each pair by
 /// w(r/σ) in a copy, which the inner metric minimizes, in closed form or not.
 ///
-/// The mean loss is that of E over the *original* weights, and not the mean of w r², which is only
-/// part of a majorizer. At a given σ, E falls with every exact step. It rises if pairs drift into
-/// the tail, although their weights vanish there, and it grows and shrinks with σ. Stop rules
-/// on the mean loss therefore keep their meaning. For [`Kernel::L2`] and for small residuals, it
-/// equals the inner loss. Pairs without rows have no part in the scale and the mean, and
-/// no weight in the copy.
+/// The mean loss is the mean of E over the *original* weights. Stop rules on it keep their meaning:
+/// at a given σ, E falls with every exact step, and it rises if pairs drift into the tail of the
+/// kernel. The mean of w r² would fall there, because the weights vanish. If σ is estimated, E also
+/// changes with σ. For [`Kernel::L2`] and for small residuals, it equals the inner loss. Pairs
+/// without rows have no part in the scale and the mean, and no weight in the copy.
 ///
-/// The kernel belongs to the set of pairs: squared errors are those of the inner metric, and
-/// [`Minimize::system`] contains the weights. Any [`RobustKernel`] can be used. Cost: one pass for
-/// the residuals, one to copy the pairs, a selection for the median, and the inner metric.
+/// The scale depends on all pairs, so the kernel is not part of the error of a single pair:
+/// [`Minimize::add_squared_errors`] adds the errors of the inner metric. [`Minimize::system`] is
+/// that of the reweighted pairs. Any [`RobustKernel`] can be used. Cost: one pass for the
+/// residuals, one to copy the pairs, a selection for the median, and the inner metric.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Robust<M, K = Kernel> {
     /// The metric to minimize.

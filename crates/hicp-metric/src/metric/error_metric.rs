@@ -109,10 +109,11 @@ pub trait ErrorMetric {
         (weight > 0.0 && mean.is_finite()).then_some(mean)
     }
 
-    /// Returns all pairs linearized, or `None` without weight or with points that are not finite.
+    /// Returns the normal equations of all pairs, linearized at the identity increment.
     ///
-    /// The provided method sums the rows of [`ErrorMetric::linearize`] around the centroid, with
-    /// lengths scaled by the RMS radius.
+    /// Returns `None` if all weights are zero or a point is not finite. The provided method sums
+    /// the rows of [`ErrorMetric::linearize`]. Rotations are around the centroid of the sources,
+    /// and lengths are scaled by their RMS radius.
     fn linearize_all(&self, pairs: &Correspondences) -> Option<NormalEquations> {
         vectorized(Linearize {
             metric: self,

@@ -95,10 +95,10 @@ pub trait Minimize {
     /// Returns `None` if there is none.
     fn inner(&mut self, iteration: &Iteration<'_>) -> Option<&mut dyn Minimize>;
 
-    /// Returns all pairs linearized, or `None` without weight or with points that are not finite.
+    /// Returns the normal equations of all pairs at the pose, for one Gauss–Newton step.
     ///
-    /// One Gauss–Newton step solves this system. Information, covariance and observability at the
-    /// pose come from it.
+    /// They also give the information, covariance and observability of the pose. Returns `None` if
+    /// all weights are zero or a point is not finite.
     fn system(
         &mut self,
         iteration: &Iteration<'_>,

@@ -27,18 +27,20 @@ pub enum Degeneracy {
     Freeze,
     /// No rotation around degenerate axes, and the translations that minimize the loss without it.
     ///
-    /// An axis is degenerate if the information about the rotation, at the best translations, is at
-    /// most a threshold times the largest eigenvalue. A translation stays only at 10⁻⁴ or less.
+    /// An axis is degenerate if the information about its rotation is at most the threshold times
+    /// the largest eigenvalue. The translations that best compensate the rotation are eliminated
+    /// first. A translation is frozen only if its information is at most 10⁻⁴ of the largest
+    /// eigenvalue, or the threshold if that is lower.
     ///
     /// It suits pairs of a surface and its silhouette. Noise and facets give some information about
-    /// rotations that nothing determines, such as that of a can around its axis. A silhouette
-    /// often has no more information about the translation of a flat side, but that determines it.
+    /// rotations that nothing determines, such as that of a can around its axis. The silhouette of
+    /// a flat side gives as little information about a translation, but it does determine it.
     FreezeRotations,
-    /// [`Self::FreezeRotations`], except for rotations that explain the residuals.
+    /// [`Self::FreezeRotations`] with a tenth of the threshold for rotations that lower the loss.
     ///
-    /// Such a rotation would remove more than 3 % of the loss. Its threshold is a tenth of the
-    /// given one. In an image with little noise, a small part of the surface or the silhouette can
-    /// determine a rotation that has little information.
+    /// The lower threshold applies to rotations that would remove more than 3 % of the loss. In an
+    /// image with little noise, a small part of the surface or the silhouette can determine a
+    /// rotation that has little information.
     FreezeUnexplained,
     /// No step if a direction is degenerate, otherwise the undamped step.
     Refuse,

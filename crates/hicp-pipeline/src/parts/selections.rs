@@ -23,11 +23,11 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(())
     });
     catalog.add_selection("visible-surface", |p| {
-        p.about = "Selects the points visible at the initial estimate of the stage or of its \
+        p.about = "Selects the points visible at the initial pose of the stage or of its \
             cascade: V_O. Source: §III-A.1. Cost: a render, shared with the score, and O(pixels).";
         let stride = stride(p, 2000, KEPT)?;
         let poses = [("stage", SelectAt::Stage), ("cascade", SelectAt::Cascade)];
-        let at = p.word("at", &poses, "whose initial estimate")?;
+        let at = p.word("at", &poses, "whose initial pose")?;
         Ok(VisibleSurface { stride, at })
     });
     catalog.add_selection("visible-side", |p| {
@@ -38,7 +38,7 @@ pub(super) fn add(catalog: &mut Catalog) {
     });
     catalog.add_selection("observed-surface", |p| {
         p.about = "Selects the observed surface, moved into the object frame at the stage's \
-            initial estimate. Cost: O(m).";
+            initial pose. Cost: O(m).";
         Ok(ObservedSurface {
             stride: stride(p, 2000, KEPT)?,
         })

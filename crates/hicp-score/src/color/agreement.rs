@@ -10,7 +10,10 @@ use crate::score::Score;
 /// down, so up to three times as many are compared.
 const PIXELS: usize = 2000;
 
-/// Scores how well the colors of a model agree with the color image: 0 perfectly, 0.5 not at all.
+/// Scores how well the colors of a model agree with the color image, from 0 to 1.
+///
+/// It is (1 − ρ)/2 for the correlation ρ of the colors: 0 if they agree, 0.5 if they are unrelated
+/// or no evidence, and 1 if they are opposite.
 ///
 /// The colors of the model and of the image are averaged over cells, a 24th of the object wide.
 /// Effects of the light are removed from both sides: per channel a gain, an offset, and an increase

@@ -194,12 +194,12 @@ pub struct Recalls {
 impl Recalls {
     /// Counts a target.
     ///
-    /// The thresholds θ, strictly above correct errors, are:
+    /// An estimate is correct if its error is strictly below the threshold θ:
     ///
     /// - VSD: 0.05, 0.10, …, 0.50 at each of its tolerances.
     /// - MSSD: the same, times the diameter.
     /// - MSPD: 5, 10, …, 50 pixels in an image 640 pixels wide.
-    /// - AD and ADD: a tenth of the diameter.
+    /// - AD (ADI for symmetric objects, otherwise ADD) and ADD: a tenth of the diameter.
     /// - MSSD in millimeters: 2, 4, …, 20.
     pub fn count(&mut self, target: &TargetErrors) {
         self.instances += target.instances;

@@ -129,10 +129,12 @@ impl Confidence {
         }
     }
 
-    /// Returns the confidence in a pose that is near an initial pose (`hicp_icp::is_near`).
+    /// Corrects the confidence in a pose that is near its initial pose (`hicp_icp::is_near`).
     ///
-    /// The initial pose chooses among `look_alikes` other poses, but not always the right one. Call
-    /// this on the confidence without look-alikes. A probability of 0 stays as it is.
+    /// `self` must be the confidence of [`Confidence::at`] with 0 look-alikes. `look_alikes` is the
+    /// number of other poses that explain the image as well. An initial pose makes them less likely
+    /// but does not exclude them, so they lower the probability by less than in [`Confidence::at`].
+    /// A probability of 0 does not change.
     #[must_use]
     pub fn near_initial(self, look_alikes: f64) -> Self {
         if self.probability == 0.0 {

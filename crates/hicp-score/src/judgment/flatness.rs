@@ -29,10 +29,10 @@ const FLAT: f64 = 0.03;
 /// tolerance is 5 % of the diameter, so a face or a side of the object fits against it. A plane
 /// then explains the depth better than the pose does.
 ///
-/// Every distance is in meters along the optical axis, and seven tenths of the pixels are nearer.
-/// The pixels are those of the mask with depth where the model is rendered, on a grid of at most
-/// 512. The plane minimizes the squares of inverse depths and is fitted repeatedly to the nearest
-/// eight tenths of the pixels.
+/// Every distance is the 70th percentile over the compared pixels, in meters along the optical
+/// axis. The compared pixels are masked, have a depth, and show the rendered model; at most 512 of
+/// them are used, on a grid. A plane is a least-squares fit of inverse depth, repeated over the
+/// nearest 80 % of the pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

@@ -33,7 +33,10 @@ const LEAST_CELLS: u32 = 8;
 pub struct Misfit {
     /// Standard deviation of the noise.
     pub sigma: f64,
-    /// Root mean square of the distance between the surfaces that nearby pixels have in common.
+    /// Root mean square of the distance between the surfaces, without the noise of single pixels.
+    ///
+    /// It comes from products of the distances at pixels two cells apart, whose noise is
+    /// independent.
     pub systematic: f64,
     /// Mean distance between the surfaces; positive if the measured one is farther.
     pub bias: f64,
@@ -43,7 +46,7 @@ pub struct Misfit {
     pub rim_ahead: f64,
     /// Share of the pixels along the outside of the silhouette at which the surface continues.
     pub rim_open: f64,
-    /// Share of 64 parts of the rendered region in which less than half of the pixels agree.
+    /// Share of the parts of an 8 × 8 division of the region in which most pixels disagree.
     pub weak: f64,
     /// Share of the measured pixels of the mask that no rendered pixel explains, even coarsely.
     pub unexplained: f64,

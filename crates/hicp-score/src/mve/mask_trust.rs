@@ -17,15 +17,15 @@ pub enum MaskTrust {
     /// - Pixels on the plane around the mask, such as a table, have no weight. If there is such a
     ///   plane, the weight rises from 4 pixels outside the mask on, because the mask may be too
     ///   small.
-    /// - Surfaces that continue outside the mask are other objects and have no weight. In a box,
-    ///   those that end inside have the full weight. This applies on a plane, if the border of the
-    ///   mask is uncertain.
+    /// - Surfaces that continue outside the mask are other objects and have no weight. If the mask
+    ///   is a box, surfaces that end inside it have the full weight. This rule applies only if
+    ///   there is a plane around the mask and the border of the mask is uncertain.
     /// - Pixels whose depth differs from that of the mask by more than the diameter have no weight.
     ///
     /// A rendered pixel with a low weight counts fully if the camera sees through it, or if it lies
     /// inside a surface that the object touches. If a nearer surface hides it, it does not count.
     /// Otherwise it counts half.
     ///
-    /// Cost: about a score more, once per observation and diameter.
+    /// Cost: about that of one more score, once per observation and diameter.
     Imperfect,
 }

@@ -18,6 +18,10 @@ use crate::tolerances::{N_TOLERANCES, errors, mean};
 /// image, and 1 if nothing agrees or nothing is visible. It does not need ground truth, so it
 /// scores a pose against the live image and serves as a measure of uncertainty.
 ///
+/// The default does not count rendered pixels outside the mask that a nearer surface hides
+/// ([`Occlusion::Tolerated`]). [`MeanVsd::paper`] is the definition of §IV-A, which counts them.
+/// [`MeanVsd::imperfect_mask`] suits the masks of detectors.
+///
 /// Masked pixels without depth count in neither mask. They contain no evidence about the pose, and
 /// would raise the score of every image with holes. An empty union is 1.
 ///

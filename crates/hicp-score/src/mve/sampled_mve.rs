@@ -24,8 +24,8 @@ use crate::tolerances::N_TOLERANCES;
 pub struct SampledMve {
     /// Approximate number of points of a side of the model; 0 scores every pose 1.
     ///
-    /// With at least twice as many points as pixels of the whole object, few pixels have none. The
-    /// object has more pixels than the mask if a part of it is hidden.
+    /// Use at least twice the number of coarse pixels that the whole object covers, so that few
+    /// pixels stay empty. If a part of the object is hidden, that number is larger than `pixels`.
     pub samples: usize,
     /// Approximate number of compared pixels of the mask.
     pub pixels: usize,

@@ -202,14 +202,15 @@ impl Registration {
         }
     }
 
-    /// Builds the pipeline: every source point to its nearest target point, at most `max_distance`
-    /// meters away, until a step moves less than 0.1 mm and 0.01°, or 100 iterations.
+    /// Builds the pipeline, which pairs every source point with its nearest target point.
     ///
-    /// If the RMS radius of the paired points is below 33 mm, 3·10⁻³ of it replaces the 0.1 mm. If
-    /// it is above 3.3 m, 3·10⁻⁵ of it does.
+    /// Pairs of more than `max_distance` meters are removed. If it is `None`, two stages run, with
+    /// a tenth and then a fiftieth of the source's diameter. The first bridges large offsets, and
+    /// the second leaves out points without a counterpart.
     ///
-    /// `None` runs twice, with a tenth and with a fiftieth of the source's diameter: it bridges
-    /// large offsets, and then leaves out points without a counterpart.
+    /// A stage ends if a step moves the source by less than 0.1 mm and 0.01°, or after 100
+    /// iterations. If the RMS radius of the paired points is below 33 mm, the limit is 3·10⁻³ of it
+    /// instead of 0.1 mm. If it is above 3.3 m, the limit is 3·10⁻⁵ of it.
     #[must_use]
     pub fn build(self, max_distance: Option<f64>) -> BoxedStage {
         match self {
@@ -308,10 +309,11 @@ impl Alignment {
 
 /// Registers two point clouds from an initial pose `target_from_source`, in meters.
 ///
-/// Either side may also be a [`Model`](hicp_core::Model) or an
-/// [`Observation`](hicp_core::Observation). The pipeline is a [`Registration`] or any stage. If a
-/// part of it needs an image or a mesh that is absent, the outcome keeps the initial pose and names
-/// the part. Never fails on data: without overlap, the outcome states that no pairs were found.
+/// The source may also be a [`Model`](hicp_core::Model), and the target an
+/// [`Observation`](hicp_core::Observation). The pipeline is that of [`Registration::build`], or any
+/// other stage. If a component of it needs a mesh or an image that is absent, the outcome keeps the
+/// initial pose and names the component. Never fails on data: without overlap, the outcome states
+/// that no pairs were found.
 ///
 /// Fitness and RMSE do not prove a pose. A can that is rotated around its axis fits as well as at
 /// the truth, and a box on its wrong side can fit better. Start from a rough pose, and read the

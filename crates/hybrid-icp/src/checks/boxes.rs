@@ -2,8 +2,8 @@
 
 use crate::warning::Warning;
 
-/// Returns whether a box has pixels of an image, as [`Mask::in_box`](hicp_core::Mask::in_box)
-/// rounds it.
+/// Returns whether a box covers pixels of an image, rounded as in
+/// [`Mask::in_box`](hicp_core::Mask::in_box).
 ///
 /// The box is x and y of its corner, width and height; the size of the image is width and height,
 /// in pixels. A box of less than a pixel has none.
@@ -21,12 +21,12 @@ pub fn box_overlaps([x, y, w, h]: [f64; 4], (width, height): (u32, u32)) -> bool
     overlaps(x, w, width) && overlaps(y, h, height)
 }
 
-/// Returns [`Warning::Box`] if a box ends outside of an image, as one of two corners often does, or
-/// within its first pixel, as one in shares of the image does.
+/// Returns [`Warning::Box`] if a bounding box is probably in another format or unit.
 ///
-/// The box is x and y of its corner, width and height, as for
-/// [`Mask::in_box`](hicp_core::Mask::in_box); the size of the image is width and height, in
-/// pixels. A tenth of the box may be outside.
+/// A box that ends outside of the image is often given by two corners. A box that ends within the
+/// first pixel is often given in fractions of the image. The box is x and y of its corner, width
+/// and height, as for [`Mask::in_box`](hicp_core::Mask::in_box). The size of the image is width and
+/// height, in pixels. A tenth of the box may be outside.
 ///
 /// ```
 /// use hybrid_icp::{Warning, checks::warning_of_box};

@@ -21,7 +21,7 @@ const MASK_RATIO: f64 = 10.0;
 /// as many pixels.
 const SLIVER_RATIO: f64 = 20.0;
 
-/// Returns the [`warnings`] that depend on an image.
+/// Returns the [`warnings`](crate::warnings) that depend on an image.
 ///
 /// `distance` is z of the object's center in the camera frame, meters. Cost: O(pixels of the mask's
 /// box) for the first time, then O(1), and O(vertices) if the mask is small for the object.

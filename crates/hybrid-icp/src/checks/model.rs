@@ -19,7 +19,7 @@ const MOVED: f64 = 0.5;
 /// versions of the mesh, with more vertices.
 const DIAMETER_TOLERANCE: f64 = 0.05;
 
-/// Returns the [`warnings`] about a model that need no image.
+/// Returns the [`warnings`](crate::warnings) about a model that need no image.
 ///
 /// ```
 /// use hybrid_icp::core::{Model, Point3, TriMesh};

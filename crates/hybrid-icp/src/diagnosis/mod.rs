@@ -52,14 +52,16 @@ pub struct Finding {
 
 /// The probable faults of the inputs of a refinement.
 ///
-/// Each of some 30 hypotheses corrects the inputs as if they had one fault. A short refinement then
-/// scores the corrected inputs, if their initial pose explains the image better than most others. A
-/// fault is named if its correction improves the score clearly, and to less than a half.
-/// Corrections that bend the surface must also fit better, such as that of distances along the ray.
+/// Each of some 30 hypotheses corrects the inputs as if they had one fault. The eight whose initial
+/// pose explains the image best are refined and scored. A fault is named if its correction lowers
+/// the score clearly, to below 0.5. A correction that bends the measured surface, such as that of
+/// distances along the ray, must also lower the MVE of the refined pose. A plane in the mask and
+/// the faults of [`Diagnosis::facts`] are named without such a comparison.
 ///
-/// The score is the MVE of the refined pose, plus the mean distance in diameters by which the
-/// refinement moved the object's points. It is 1 if the numbers of the inputs exclude each other
-/// ([`warnings`](crate::warnings)).
+/// The score is the MVE of the refined pose, plus the mean distance by which the refinement moved
+/// the object's points. That distance is relative to the diameter, or to a fifth of the object's
+/// distance if that is shorter. If the MVE of the initial pose is lower, the score is that MVE. It
+/// is 1 if the inputs contradict each other ([`warnings`](crate::warnings)).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]

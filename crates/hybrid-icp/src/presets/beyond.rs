@@ -208,15 +208,18 @@ pub(crate) fn far() -> Far {
 
 /// `local`: local refinement that never returns a pose with a higher score than the initial one.
 ///
-/// The score is the MVE for the masks of detectors ([`MeanVsd::imperfect_mask`]). The first stage
-/// renders the model in each iteration, and fits the depth along the rays ([`RenderedSurface`]) and
-/// the silhouette ([`Contour`]). Depths count up to a difference of 0.12 diameters. This first
-/// stage solves rotations with little information if they explain the residuals. If the [`Doubt`]
-/// is then 0.1 or more, the same stage runs with 0.25 diameters. Then [`SwitchUntilStall`] runs up
-/// to six steps, until the score stalls, and keeps the pose with the lowest one. A step starts with
-/// the projective cascade if the estimate agrees with the image. Otherwise it pairs observed points
-/// with the model, first with point-to-point and then with the symmetric metric. It ends with four
-/// iterations of the first stage.
+/// The score is the MVE for the masks of detectors ([`MeanVsd::imperfect_mask`]).
+///
+/// 1. **Fit**: up to eight iterations pair the rendered model with the image, by the depth along
+///    the rays ([`RenderedSurface`], differences up to 0.12 diameters) and across the silhouette
+///    ([`Contour`]). Rotations with little information are frozen, unless they explain the
+///    residuals. If the [`Doubt`] is then below 0.1, the pipeline ends.
+/// 2. **Wide fit**: differences up to 0.25 diameters count, and rotations with little information
+///    stay frozen, also in later fits.
+/// 3. **Steps**: [`SwitchUntilStall`] runs up to six steps until the score stalls, and keeps the
+///    pose with the lowest score. A step runs the projective cascade if the pose agrees with the
+///    image. Otherwise it pairs observed points with the model, first with point-to-point and then
+///    with the symmetric metric. Each step ends with four iterations of the fit.
 #[must_use]
 pub fn local() -> Local {
     let mut first = fit();
@@ -317,13 +320,15 @@ pub fn search_with(options: SearchOptions) -> Search {
     search_from(local(), options)
 }
 
-/// `search`: [`local`], followed by a search if the product of its doubt and its score is above
-/// 0.002.
+/// `search`: [`local`], followed by a search if the returned pose is doubtful.
 ///
-/// The search ranks 1000 rotations, aligns 256 of them and refines 24. If the local pose is near
-/// the initial one, it aligns and refines a quarter of these. Otherwise it goes on with all
-/// rotations while the pose stays bad. A hypothesis must beat the local pose by a gain. The result
-/// can be far from the initial pose, also at a pose that is equivalent by symmetry.
+/// The search starts if the product of doubt and score is above 0.002, or above 0.001 if the local
+/// pose is far from the initial one. It ranks 1000 rotations, aligns the best 256 and refines 24.
+/// If the local pose is near the initial one, it aligns and refines a quarter of these. Otherwise,
+/// if the best pose is still bad, it once aligns all ranked rotations and refines twice as many. A
+/// hypothesis must beat the local pose by a gain ([`SearchOptions::near_gain`],
+/// [`SearchOptions::far_gain`]). The result can be far from the initial pose, also at a pose that
+/// is equivalent by symmetry.
 #[must_use]
 pub fn search() -> Search {
     search_with(SearchOptions::default())

@@ -1,16 +1,17 @@
-//! Hybrid ICP and the eight baselines of the paper's Table I, each a plain composition of public
-//! parts; and the presets that go beyond the paper ([`hybrid_visible`], [`local`], [`search`],
-//! [`auto`]), in a file of their own.
+//! The presets as functions: Hybrid ICP, the eight baselines of the paper, and presets beyond it.
+//!
+//! Each is a plain composition of public components. The baselines are those of Table I. The
+//! presets beyond the paper are [`hybrid_visible`], [`local`], [`search`], [`auto`] and [`color`].
 //!
 //! The sections of the paper: §III-A for the parts, §IV-B for the cascade and its divergence rules,
 //! §IV-C for Hybrid ICP, §VI-B for the baselines. The paper leaves some choices open; its variants
 //! share these:
 //!
 //! - O is the whole surface for nearest neighbors ([`AllSamples`]) and the visible one for
-//!   projective association ([`VisibleSurface`], V_O rendered at the stage's initial estimate).
+//!   projective association ([`VisibleSurface`], V_O rendered at the stage's initial pose).
 //! - τ_max and θ_max are off.
-//! - Every stage ends by the same rules: the paper's divergence rules as written, convergence of
-//!   the loss, 50 iterations.
+//! - Every stage ends by the same rules: [`Divergence::strict`], convergence of the loss, 50
+//!   iterations.
 //!
 //! Each preset has a named type whose fields are public, so that a program can change it:
 //!
@@ -63,7 +64,7 @@ pub type PaperStop = (Divergence, Convergence, IterationLimit);
 // Deviation: divergence rules of the baselines: §IV-B.2 states them for Cascading ICP. Here they
 // end the single-metric baselines too, so that all variants differ in association and metric alone.
 // It favors the baselines.
-/// Returns the paper's rules: divergence as written, convergence of the loss, 50 iterations.
+/// Returns the paper's rules: strict divergence, convergence of the loss, 50 iterations.
 #[must_use]
 pub fn paper_stop() -> PaperStop {
     (
@@ -162,8 +163,10 @@ pub fn nn_cascade_plane_point() -> NearestCascade<PointToPlane, PointToPoint> {
     Cascade((nearest(PointToPlane), nearest(PointToPoint)))
 }
 
-/// `hybrid`: Hybrid ICP (§IV-C). Twice: score the estimate by the MVE; below α = 0.4 run the
-/// projective cascade, else nearest-neighbor point-to-point.
+/// `hybrid`: Hybrid ICP (§IV-C), two passes of a switch between two stages.
+///
+/// A pass scores the pose by the MVE. Below α = 0.4 it runs the projective cascade, and otherwise
+/// nearest-neighbor point-to-point.
 #[must_use]
 // Deviation: occluded pixels in the MVE: §IV-A.2 counts every pixel of both masks. Here a rendered
 // pixel behind a measured surface outside the mask does not count. If nothing stands in front of

@@ -109,11 +109,15 @@ impl SequentialEstimator {
 
     /// Creates an estimator for an object.
     ///
-    /// `fuser` is a [`FusionMethod`], or any [`Fuser`]. It is behind a [`Gated`], which resets it
-    /// to replace what it holds. Until an estimate passes the gate, it holds the best one that
-    /// failed. Uncertainty is the MVE around the object's center, and rotations count by its
-    /// radius. Later estimates with an MVE above 0.4 are skipped, and symmetric poses are brought
-    /// together. Methods that keep estimates keep the newest 100, which bounds the cost of a step.
+    /// `fuser` is a [`FusionMethod`], or any [`Fuser`]. It receives estimates as follows:
+    ///
+    /// - The covariance of an estimate is its MVE times [`UnitCovariance::AboutObject`]. A rotation
+    ///   by 1 rad around the object's center counts as a translation by its radius.
+    /// - An estimate of a symmetric object is replaced by the equivalent pose nearest to the held
+    ///   one ([`SymmetryAware`]).
+    /// - A [`Gated`] rejects estimates with an MVE above 0.4. Until one passes, it holds the failed
+    ///   one with the lowest MVE, and resets `fuser` to replace it.
+    /// - Methods that keep estimates keep the newest 100, which bounds the cost of a step.
     ///
     /// # Errors
     ///

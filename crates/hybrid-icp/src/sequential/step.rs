@@ -76,7 +76,11 @@ impl SequentialEvent {
     }
 }
 
-/// Counts the images that contradict the motion of the camera, which has no other check.
+/// Counts the images that agree with the stated motion of the camera, and those that contradict it.
+///
+/// Nothing else checks the motion. Call [`MotionCheck::add`] after each step of a
+/// [`SequentialEstimator`](crate::SequentialEstimator). If [`MotionCheck::contradicting`] returns a
+/// number, the motions are probably wrong, for example inverted or in another unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotionCheck {
     accepted: usize,
@@ -84,7 +88,7 @@ pub struct MotionCheck {
 }
 
 impl MotionCheck {
-    /// Counts an image that was registered.
+    /// Counts an image by the event of its step.
     pub fn add(&mut self, event: &SequentialEvent) {
         match event {
             SequentialEvent::Estimated(Update::Accepted(_)) => self.accepted += 1,

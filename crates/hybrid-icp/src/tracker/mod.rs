@@ -44,11 +44,10 @@ const NEAR_DIAMETERS: f64 = 0.4;
 /// example because a time is wrong, the filter starts again from the registered one, at rest.
 ///
 /// The [`Evidence`] at the pose decides about the state. A hidden pixel is never evidence for a
-/// pose: an object that is hidden entirely is lost after
-/// [`TrackerConfig::coast_seconds`]. A lost object is searched, in a region that grows with time,
-/// among the surfaces of about its size. A found pose that is not nearly certain is
-/// [`TrackState::Doubtful`] until the next image confirms it. If a pose that looks like it is as
-/// likely, it stays doubtful until an image shows the difference.
+/// pose: an object that is hidden entirely is lost after [`TrackerConfig::coast_seconds`]. The
+/// tracker then searches for it among surfaces of about its size, in a region that grows with time.
+/// A pose that was found is [`TrackState::Doubtful`] until the next image confirms it, unless it is
+/// nearly certain. It also stays doubtful while another pose that looks like it is as likely.
 ///
 /// Cost of a step while tracking: about that of `hybrid`, including the observation. A step that
 /// searches for the object takes some tens of milliseconds, and rarely up to 0.4 s. Use one tracker
@@ -129,9 +128,8 @@ impl Tracker {
     /// Tracks the object in the next image.
     ///
     /// `seconds` is the time since the previous image, 0 for one of the same instant. A mask is not
-    /// needed; if there is one, the object is looked for only in its pixels. Before
-    /// [`Tracker::start`], the result is the identity with the state [`TrackState::Lost`].
-    /// Deterministic.
+    /// needed; if there is one, only its pixels are used. Before [`Tracker::start`], the result is
+    /// the identity with the state [`TrackState::Lost`]. Deterministic.
     ///
     /// # Errors
     ///

@@ -52,7 +52,7 @@ pub enum TrackError {
 pub enum TrackState {
     /// The image shows the object at the pose.
     Tracking,
-    /// The pose may be off: the image does not determine it, or does not show it for some frames.
+    /// The pose may be wrong: the image does not determine it, or has not shown it for some frames.
     Doubtful,
     /// The object is not seen. The pose is a guess from its last motion.
     Lost,

@@ -22,8 +22,9 @@ use split::Split;
 /// A line of pixels crosses the silhouette at each point, perpendicular to it (correspondence
 /// lines: RAPID, Harris & Stennett 1990; ICG, Stoiber et al. 2022). Along the line, the border is
 /// the split that best separates pixels of the object from pixels of the background. The evidence
-/// of a pixel is the likelihood of its depth under the rendered surface, against the plane around
-/// the mask and anything else, and the mask.
+/// of a pixel is the sum of two terms. The first is the log-likelihood ratio of its depth, between
+/// the rendered surface and the background: the plane around the mask, or any other surface. The
+/// second is positive inside the mask and negative outside.
 ///
 /// The mask is not taken for granted. Its border is compared with the borders that depth alone
 /// shows: the median offset is removed, and the spread decides the mask's influence. A mask that is
@@ -33,8 +34,9 @@ use split::Split;
 /// observation has fewer than three measured pixels, there are no pairs.
 ///
 /// Use it with [`RenderedSurface`](crate::RenderedSurface) as a tuple, point-to-plane and the
-/// selection `()`. The normals of a pair lie in the image plane of the silhouette. Weights are the
-/// inverse variances of a border relative to those of a depth, so that both kinds of rows add up.
+/// selection `()`. The two normals of a pair are equal and perpendicular to the ray. A weight is
+/// the variance of a depth divided by that of the border, so rows of both associations can be
+/// summed.
 ///
 /// `source` is ignored. `source_index` is the index of the pixel in the rendered region.
 /// `target_index` is [`Pair::UNLISTED`]. The lines are the candidates.
@@ -43,12 +45,12 @@ use split::Split;
 /// pixels per line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
-    /// Number of lines, about.
+    /// Approximate number of lines.
     pub lines: usize,
     /// Distance from the silhouette at which a line ends, as a fraction of the diameter, but at
     /// least 10 pixels.
     pub reach_diameters: f64,
-    /// Factor of the weights. 1 is right for independent lines.
+    /// Factor on all weights: 1 if the lines are independent, less if they are correlated.
     pub weight: f64,
     scratch: Scratch<(Silhouette, Vec<Line>, MaskBorder)>,
 }

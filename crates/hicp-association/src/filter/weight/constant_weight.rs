@@ -7,8 +7,9 @@ use crate::length::narrow;
 
 /// Multiplies every weight by a constant.
 ///
-/// The step of a single stage does not depend on it. Losses do, and so does a sum of several sets
-/// of pairs. Cost: O(pairs).
+/// It changes neither the step of a single metric nor the mean loss, which is a weighted mean. It
+/// changes the information of the pairs, and so their influence relative to terms without these
+/// weights, such as a `PosePrior`. Cost: O(pairs).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantWeight {
     /// The factor. Negative values, NaN and infinity count as 0.

@@ -15,17 +15,18 @@ use crate::stage::stage_trait::Stage;
 
 /// Runs a stage, and lets color decide between its pose and others that explain the depth as well.
 ///
-/// 1. The others are the alternatives that the stage found, and poses at which the model nearly
-///    covers itself: a box turned end over end, a can turned around its axis. If the image shows
-///    what tells them apart in depth, such as the handle of a mug, they are left out.
-/// 2. They are ranked by the colors of samples, and the best few are polished. A polish with a
-///    [`Photometric`](hicp_metric::Photometric) metric also finds the rotation that the depth does
-///    not determine.
-/// 3. If the colors agree only roughly, [`ColorAgreement`] is compared at the neighbors of the pose
-///    of the stage and of the best other one, and the best neighbor is polished.
-/// 4. [`ColorAgreement`] decides. Another pose replaces that of the stage only if its score of the
-///    depth is nearly as good, its colors agree clearly better, and no pose near that of the stage
-///    agrees as well.
+/// 1. **Candidates** are the alternatives that the stage found, and poses at which the model nearly
+///    covers itself: a box rotated end over end, a can rotated around its axis. Poses that the
+///    depth image can tell apart, for example by the handle of a mug, are not candidates.
+/// 2. **Polish**: the candidates are ranked by the colors of samples, and `polish` refines the best
+///    three. With a [`Photometric`](hicp_metric::Photometric) metric, it also finds a rotation that
+///    the depth does not determine.
+/// 3. **Neighbors**: if the colors still agree only roughly, [`ColorAgreement`] is measured at the
+///    candidates near the stage's pose, and at those near the best other pose. `polish` refines the
+///    best of each.
+/// 4. **Decision**: by [`ColorAgreement`]. Another pose replaces the stage's pose only if its score
+///    in depth is nearly as good, its colors agree clearly better, and no pose near the stage's
+///    pose agrees as well.
 ///
 /// [`Alternative::color_gap`] then has the margin of each alternative that is nearly as good in
 /// depth.

@@ -42,10 +42,10 @@ use crate::stage::stage_trait::Stage;
 ///    one, one fit of another pose is enough, for the list of the others.
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
-/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. If another pose looks
-/// like it, is nearer to the initial rotation, and explains the image within 0.02 as well, that one
-/// is returned: the rotation of a can is often known from elsewhere. The others are in
-/// [`Workspace::alternatives`](crate::Workspace::alternatives).
+/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. A look-alike of the
+/// best pose replaces it if its rotation is nearer to the initial one and its score is at most 0.02
+/// higher. The initial rotation then decides: that of a can, for example, may be known from another
+/// source. The other poses are in [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
 /// Within another search, it only runs its local stage.
 ///
@@ -59,11 +59,17 @@ use crate::stage::stage_trait::Stage;
 /// local stage in a [`Guard`](crate::Guard) is never worse than the initial pose. With a bound, a
 /// pose outside of it is never returned; the initial pose replaces a local pose that is outside.
 ///
-/// Cost: the local stage. If doubt × score is above the threshold, also `hypotheses` × the ranking
-/// score, `aligned` × the aligning stage, `refined` + 8 × the exploring stage, three or four times
-/// the finishing stage, and up to four times the local stage. If all poses stay doubtful, the
-/// finishing stage runs up to `refined` / 2 times, and if the search goes on, it costs about three
-/// times as much. The near symmetries of a model are found once, in some 10 ms.
+/// Cost: the local stage. If doubt × score is above the threshold, a search adds:
+///
+/// - The ranking score, `hypotheses` times.
+/// - The aligning stage, `aligned` times.
+/// - The exploring stage, up to `refined` + 8 times.
+/// - The finishing stage, three or four times, or up to `refined` / 2 times if all poses stay
+///   doubtful.
+/// - The local stage, up to four times.
+///
+/// If the search widens, it costs about three times as much. The near symmetries of a model are
+/// found once, in some 10 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, A, E, F, R, C, D> {
     /// Refines the initial pose, and the pose found.
@@ -92,7 +98,7 @@ pub struct HypothesisSearch<S, A, E, F, R, C, D> {
 }
 
 impl<S, A, E, F, R, C, D> HypothesisSearch<S, A, E, F, R, C, D> {
-    /// Creates the stage.
+    /// Creates the search from its local stage, its other stages, its scores and its options.
     #[must_use]
     pub fn new(
         stage: S,

@@ -97,12 +97,12 @@ pub(crate) fn nearest_to_initial(
     (degrees(&nearest) < degrees(pose)).then_some(nearest)
 }
 
-/// Counts the poses that look like a given one and explain the image as well.
+/// Estimates the number of poses that look like a given one and explain the image as well.
 ///
-/// A pose looks like another one if the model nearly covers it, such as a mug that is rotated
-/// around its axis while its handle is hidden. At most 4 of them are counted, each by
-/// exp(−gap / 0.01) of its gap in score, if its MSSD from the pose is above a tenth of the
-/// diameter. Declared symmetries are no look-alikes.
+/// Two poses look alike if the model at one nearly covers the model at the other. An example is a
+/// mug that is rotated around its axis while its handle is hidden. At most four look-alikes count.
+/// Each adds exp(−g / 0.01), where g is its score minus that of the given pose, at most 1. Poses
+/// within an MSSD of a tenth of the diameter, up to declared symmetries, do not count.
 ///
 /// ```
 /// use hicp_icp::LookAlikeCount;
@@ -120,7 +120,7 @@ pub struct LookAlikeCount<R, C> {
 }
 
 impl<R: Score, C: Score> LookAlikeCount<R, C> {
-    /// Creates the count.
+    /// Creates the counter from a cheap score that ranks, and a score that compares.
     #[must_use]
     pub fn new(ranking: R, score: C) -> Self {
         Self {
