@@ -29,6 +29,10 @@ pub(crate) struct Found {
 
 /// The score that outweighs a doubt of 1.
 const DOUBT_WEIGHT: f64 = 0.1;
+/// The doubt up to which a pose needs no gain but a clearly lower score.
+const CERTAIN: f64 = 0.02;
+/// The difference of a clearly lower score.
+const CLEAR: f64 = 0.01;
 /// The doubt in every pose: of those without doubt, some percent are wrong.
 pub(crate) const LEAST_DOUBT: f64 = 0.05;
 
@@ -89,6 +93,19 @@ impl FoundPoses {
     pub(crate) fn cheapest(&self) -> Option<Found> {
         let poses = self.poses.iter().copied();
         poses.min_by(|a, b| a.cost().total_cmp(&b.cost()))
+    }
+
+    /// Returns the pose with the lowest score, if it is certain that it is better than `other`.
+    ///
+    /// It then has nearly no doubt, less than the other pose, and a score that is clearly lower
+    /// than that of every pose found. The handle of a mug, for example, changes the score by only
+    /// some percent.
+    pub(crate) fn certain(&self, other: &Found) -> Option<Found> {
+        let (best, rest) = self.poses.split_first()?;
+        let mut rivals = rest.iter().chain([other]);
+        let is_clear = rivals.all(|rival| best.score < rival.score - CLEAR);
+        let is_certain = best.doubt() <= CERTAIN && best.doubt() < other.doubt();
+        (is_clear && is_certain).then_some(*best)
     }
 
     /// Adds a pose and returns whether it stays. Of two poses that are not distinct, the one with
@@ -186,6 +203,22 @@ mod tests {
             ..found(0.0, 0.0)
         };
         assert!(!unknown.beats(&local, 0.1));
+    }
+
+    #[test]
+    fn a_certain_pose_has_no_rival() {
+        let local = found(0.05, 0.04);
+        let among = |poses: Vec<Found>| FoundPoses { poses }.certain(&local);
+        let best = found(0.02, 0.01);
+        assert_eq!(among(vec![best, local]), Some(best));
+        assert_eq!(among(vec![best, found(0.025, 0.5), local]), None);
+        assert_eq!(among(vec![found(0.045, 0.01), local]), None);
+        assert_eq!(among(vec![found(0.02, 0.03), local]), None);
+        assert_eq!(
+            FoundPoses { poses: vec![best] }.certain(&found(0.05, 0.01)),
+            None
+        );
+        assert_eq!(among(vec![local]), None);
     }
 
     #[test]

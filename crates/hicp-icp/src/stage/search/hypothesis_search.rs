@@ -442,7 +442,9 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         self.finish(&mut run, beatable);
         let (mut returned, mut score) = (local, from.map_or(f64::INFINITY, |from| from.score));
         let wins = |found: &Found, gain| from.is_none_or(|from| found.beats(&from, gain));
-        if let Some(best) = self.found.cheapest().filter(|best| wins(best, gain)) {
+        let best = self.found.cheapest().filter(|best| wins(best, gain));
+        let certain = || from.and_then(|from| self.found.certain(&from));
+        if let Some(best) = best.or_else(certain) {
             let nearest = if ignored {
                 None
             } else {
