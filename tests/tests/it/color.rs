@@ -1,6 +1,7 @@
 //! The agreement of colors, and the choice by color.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use hicp_sim::{Household, Lighting, Texture, stream};
 use hicp_tests::painted::Painted;
@@ -246,6 +247,38 @@ fn color_turns_slender_objects_and_ones_with_much_noise() {
         let error = points.mssd(pose, &seen.truth) / points.diameter();
         assert!(error < 0.05, "{}: {error}", object.name());
     }
+}
+
+#[test]
+fn a_color_image_off_by_two_pixels_moves_no_pose_that_depth_determines() {
+    let (painted, seen) = scene(Household::Carton, Texture::Logos);
+    let model = &painted.scenes.objects[seen.model].1;
+    let points = ModelPoints::new(model);
+    let observation = painted
+        .observe(&seen, MaskKind::Exact, &lighting(), 5)
+        .unwrap();
+    let color = observation.color().unwrap();
+    let (width, height) = (color.width(), color.height());
+    let moved = |(u, v)| color.get((u + 2) % width, v).unwrap();
+    let pixels = observation.camera().region().pixels().map(moved);
+    let color = ColorImage::new(width, height, pixels.collect()).unwrap();
+    let observation = Observation::new(
+        Arc::clone(observation.shared_depth()),
+        observation.mask().clone(),
+        *observation.camera(),
+    );
+    let observation = observation.unwrap().with_color(color).unwrap();
+    let start = turned(&painted, &seen);
+    let error = |preset: Preset, start: &Isometry3<f64>| {
+        let refined = Refiner::preset(preset).refine(model, &observation, start);
+        points.mssd(&refined.outcome.camera_from_object, &seen.truth) / points.diameter()
+    };
+    assert!(error(Preset::Auto, &start) > 0.5);
+    let (by_color, by_depth) = (
+        error(Preset::Color, &start),
+        error(Preset::Auto, &seen.truth),
+    );
+    assert!(by_color < by_depth + 0.002, "{by_color} {by_depth}");
 }
 
 /// Returns a mesh whose distance from the z-axis waves by a length in meters, as if it were dented.

@@ -21,12 +21,14 @@ use crate::stage::stage_trait::Stage;
 /// 2. **Polish**: the candidates are ranked by the colors of samples, and `polish` refines the best
 ///    three. With a [`Photometric`](hicp_metric::Photometric) metric, it also finds a rotation that
 ///    the depth does not determine.
-/// 3. **Neighbors**: if the colors still agree only roughly, [`ColorAgreement`] is measured at the
-///    candidates near the stage's pose, and at those near the best other pose. `polish` refines the
-///    best of each.
+/// 3. **Comparison**: if the colors still agree only roughly, [`ColorAgreement`] ranks the best 24
+///    candidates again, and `polish` refines the best three.
 /// 4. **Decision**: by [`ColorAgreement`]. Another pose replaces the stage's pose only if its score
 ///    in depth is nearly as good, its colors agree clearly better, and no pose near the stage's
 ///    pose agrees as well.
+/// 5. **Depth**: the stage refines the chosen pose, without a search, unless there are candidates
+///    near it, such as the rotations of a can. An error in the alignment of the color image then
+///    moves only poses that depth does not determine.
 ///
 /// [`Alternative::color_gap`] then has the margin of each alternative that is nearly as good in
 /// depth.
@@ -36,7 +38,7 @@ use crate::stage::stage_trait::Stage;
 /// only runs its stage: put it around the search.
 ///
 /// Cost: nothing without colors, or with a model of one color. Otherwise some 20 µs if depth leaves
-/// no choice, 1 ms if it does but the colors agree at the pose of the stage, and 2 to 15 ms if they
+/// no choice, 1 ms if it does but the colors agree at the pose of the stage, and 2 to 20 ms if they
 /// do not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorChoice<S, P, C> {
@@ -67,10 +69,10 @@ const PERFECT: f64 = 0.95;
 const TOLERANCE: f64 = 0.2;
 /// Largest MSSD of a base from a pose that is ranked already, as a share of the diameter.
 const SAME_BASE: f64 = 0.04;
-/// Number of poses that are polished.
+/// Number of poses of a ranking that are polished.
 const POLISHED: usize = 3;
-/// Largest number of candidates near a pose whose colors are compared.
-const NEARBY: usize = 12;
+/// Number of best ranked candidates whose colors are compared in a render.
+const COMPARED: usize = 24;
 
 impl<S, P, C> ColorChoice<S, P, C> {
     /// Creates the stage with the default conditions.
@@ -127,7 +129,7 @@ impl<S, P, C> ColorChoice<S, P, C> {
     }
 }
 
-impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
+impl<S: Stage, P: Stage, C: Score> ColorChoice<S, P, C> {
     /// Measures the colors and the depth at the pose of an outcome.
     fn measure(
         &mut self,
@@ -158,7 +160,6 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             return outcome;
         }
         let first = self.measure(problem, outcome, session);
-        self.ranked.clear();
         let mut tried = Tried {
             distinct,
             least_correlation: self.least_correlation,
@@ -171,41 +172,113 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             // Only the pose itself is left to polish.
             ranked = &candidates[..usize::from(first.color.correlation < PERFECT)];
         }
-        for pose in ranked {
-            let score = self.color.score(&mut session.context(problem), pose);
-            insert(&mut self.ranked, (score, *pose), distinct);
+        self.rank(problem, ranked, session);
+        let mut starts = Vec::new();
+        for ranked in &self.ranked {
+            insert(&mut starts, *ranked, distinct);
         }
-        let mut iterations = outcome.iterations;
-        let ranked = std::mem::take(&mut self.ranked);
-        for (_, start) in &ranked {
-            iterations += self.polish(problem, start, &mut tried, session);
-            if tried.is_sure() {
-                break;
-            }
-        }
-        self.ranked = ranked;
-        // Ranks are rough, and a polish moves a pose only a little.
-        for apart in [false, true] {
-            let best = if apart {
-                tried.other()
-            } else {
-                Some(tried.own())
-            };
-            if let Some(best) = best.filter(|_| !tried.is_sure())
-                && let Some(start) = self.nearby(problem, best, (&candidates, distinct), session)
-            {
-                iterations += self.polish(problem, &start, &mut tried, session);
-            }
+        let mut iterations =
+            outcome.iterations + self.polish_all(problem, &starts, &mut tried, session);
+        if !tried.is_sure() {
+            let compared = self.compare(problem, distinct, session);
+            let new = |start: &&(f64, Isometry3<f64>)| starts.iter().all(|old| old.1 != start.1);
+            let compared: Vec<_> = compared.iter().filter(new).copied().collect();
+            iterations += self.polish_all(problem, &compared, &mut tried, session);
         }
         if !tried.all().any(|tried| tried.color.is_telling()) {
             return outcome;
         }
-        let chosen = *tried.chosen();
-        self.list(problem, &chosen, &tried, session);
+        let chosen = tried.chosen();
+        let fitted = self.fit_depth(problem, chosen, (&tried, &candidates), session);
+        iterations += fitted.outcome.iterations - chosen.outcome.iterations;
+        self.list(problem, &fitted, &tried, session);
         Outcome {
             iterations,
-            ..chosen.outcome
+            ..fitted.outcome
         }
+    }
+
+    /// Ranks poses by the colors of samples, best first.
+    fn rank(&mut self, problem: &Problem<'_>, poses: &[Isometry3<f64>], session: &mut Session<'_>) {
+        self.ranked.clear();
+        for pose in poses {
+            let score = self.color.score(&mut session.context(problem), pose);
+            self.ranked.push((score, *pose));
+        }
+        self.ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+
+    /// Ranks the best ranked poses by renders, which average the colors of more places.
+    fn compare(
+        &mut self,
+        problem: &Problem<'_>,
+        distinct: &Distinct,
+        session: &mut Session<'_>,
+    ) -> Vec<(f64, Isometry3<f64>)> {
+        let limit = SAME_BASE * problem.model().map_or(0.0, Model::diameter);
+        let (mut compared, mut best) = (Vec::with_capacity(COMPARED), Vec::new());
+        for (_, pose) in &self.ranked {
+            let same = |other: &Isometry3<f64>| distinct.mssd(other, pose) < limit;
+            if compared.len() == COMPARED || compared.iter().any(same) {
+                continue;
+            }
+            compared.push(*pose);
+            let score = self.agreement.score(&mut session.context(problem), pose);
+            insert(&mut best, (score, *pose), distinct);
+        }
+        best
+    }
+
+    /// Refines a polished pose by depth, if depth determines it and its score is then not higher.
+    fn fit_depth(
+        &mut self,
+        problem: &Problem<'_>,
+        chosen: &Measured,
+        (tried, candidates): (&Tried<'_>, &[Isometry3<f64>]),
+        session: &mut Session<'_>,
+    ) -> Measured {
+        let (pose, distinct) = (chosen.pose(), tried.distinct);
+        let same = SAME_BASE * problem.model().map_or(0.0, Model::diameter);
+        let is_near = |other: &Isometry3<f64>| {
+            distinct.mssd(other, pose) > same && !distinct.apart(other, pose)
+        };
+        if pose == tried.first.pose() || candidates.iter().any(is_near) {
+            return *chosen;
+        }
+        session.searching = true;
+        let next = self.stage.run(problem, pose, session);
+        session.searching = false;
+        let outcome = chosen.outcome.then(next);
+        let fitted = &outcome.camera_from_object;
+        let score = self.score.score(&mut session.context(problem), fitted);
+        if score > chosen.score || distinct.apart(fitted, pose) {
+            return *chosen;
+        }
+        Measured {
+            score,
+            outcome,
+            ..*chosen
+        }
+    }
+
+    /// Polishes poses until the colors of one agree so well that no other is needed.
+    ///
+    /// Returns the number of iterations.
+    fn polish_all(
+        &mut self,
+        problem: &Problem<'_>,
+        starts: &[(f64, Isometry3<f64>)],
+        tried: &mut Tried<'_>,
+        session: &mut Session<'_>,
+    ) -> usize {
+        let mut iterations = 0;
+        for (_, start) in starts {
+            iterations += self.polish(problem, start, tried, session);
+            if tried.is_sure() {
+                break;
+            }
+        }
+        iterations
     }
 
     /// Polishes a pose, and adds it to those tried if it explains the depth.
@@ -226,29 +299,6 @@ impl<S, P: Stage, C: Score> ColorChoice<S, P, C> {
             tried.others.push(found);
         }
         polished.iterations
-    }
-
-    /// Returns the candidate near a pose whose colors agree best, if they agree better there.
-    fn nearby(
-        &mut self,
-        problem: &Problem<'_>,
-        from: &Measured,
-        (candidates, distinct): (&[Isometry3<f64>], &Distinct),
-        session: &mut Session<'_>,
-    ) -> Option<Isometry3<f64>> {
-        let near = candidates.iter();
-        let near = near.filter(|other| !distinct.apart(other, from.pose()));
-        let near: Vec<_> = near.collect();
-        let step = near.len().div_ceil(NEARBY).max(1);
-        let mut context = session.context(problem);
-        let mut best = (from.color.correlation, None);
-        for pose in near.into_iter().step_by(step) {
-            let color = self.agreement.measure(&mut context, pose);
-            if color.correlation > best.0 {
-                best = (color.correlation, Some(*pose));
-            }
-        }
-        best.1
     }
 
     /// Lists the alternatives to the chosen pose, those that color does not tell apart first.

@@ -9,7 +9,7 @@ use crate::stage::search::distinct::Distinct;
 /// Correlation at which no other pose is tried.
 const SURE: f64 = 0.8;
 /// Correlation that a single cell might have by chance; it falls with the root of their number.
-const CHANCE: f64 = 3.5;
+const CHANCE: f64 = 4.0;
 /// Share of that correlation by which another pose must beat that of the stage.
 const GAIN: f64 = 0.7;
 /// Share of the gain that suffices for a pose that is nearly the same.
