@@ -39,11 +39,12 @@ use crate::stage::stage_trait::Stage;
 ///    `refined` if all stay doubtful. They are compared by score + doubt / 10, before the fit and
 ///    after it. Then the local stage refines the best one. If the local pose is far from the
 ///    initial one, it also refines up to three others within 0.04. If no pose can beat the local
-///    one, one fit of another pose is enough, for the list of the others.
+///    one by the gain, one fit of another pose is enough, for the list of the others.
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
-/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. A look-alike of the
-/// best pose replaces it if its rotation is nearer to the initial one and its score is at most 0.02
+/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. A pose needs no gain
+/// if it is nearly without doubt and clearly better than every other one. A look-alike of the best
+/// pose replaces it if its rotation is nearer to the initial one and its score is at most 0.02
 /// higher. The initial rotation then decides: that of a can, for example, may be known from another
 /// source. The other poses are in [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
