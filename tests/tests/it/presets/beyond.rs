@@ -340,7 +340,7 @@ fn poses_that_look_the_same_are_ambiguous_unless_declared() {
 /// The handle changes the score by less than the gain that a search requires.
 #[test]
 fn a_rotated_mug_is_rotated_back_if_the_image_shows_its_handle() {
-    for (seed, degrees) in [(7, -55.0), (12, 25.0), (31, -55.0)] {
+    for (seed, degrees) in [(7, -55.0), (12, 25.0), (31, -55.0), (37, -35.0)] {
         let scene = scene(Household::Mug, 0.5, &mut rng(seed));
         let start = scene.truth * Isometry3::rotation(Vector3::z() * f64::to_radians(degrees));
         let error = |preset| {

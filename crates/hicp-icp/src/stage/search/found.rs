@@ -97,15 +97,13 @@ impl FoundPoses {
 
     /// Returns the pose with the lowest score, if it is certain that it is better than `other`.
     ///
-    /// It then has nearly no doubt, less than the other pose, and a score that is clearly lower
-    /// than that of every pose found. The handle of a mug, for example, changes the score by only
-    /// some percent.
+    /// It then has nearly no doubt, and a score that is clearly lower than that of every pose
+    /// found. The handle of a mug, for example, changes the score by only some percent.
     pub(crate) fn certain(&self, other: &Found) -> Option<Found> {
         let (best, rest) = self.poses.split_first()?;
         let mut rivals = rest.iter().chain([other]);
         let is_clear = rivals.all(|rival| best.score < rival.score - CLEAR);
-        let is_certain = best.doubt() <= CERTAIN && best.doubt() < other.doubt();
-        (is_clear && is_certain).then_some(*best)
+        (is_clear && best.doubt() <= CERTAIN).then_some(*best)
     }
 
     /// Adds a pose and returns whether it stays. Of two poses that are not distinct, the one with
@@ -214,10 +212,6 @@ mod tests {
         assert_eq!(among(vec![best, found(0.025, 0.5), local]), None);
         assert_eq!(among(vec![found(0.045, 0.01), local]), None);
         assert_eq!(among(vec![found(0.02, 0.03), local]), None);
-        assert_eq!(
-            FoundPoses { poses: vec![best] }.certain(&found(0.05, 0.01)),
-            None
-        );
         assert_eq!(among(vec![local]), None);
     }
 

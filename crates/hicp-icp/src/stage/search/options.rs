@@ -41,8 +41,8 @@ pub struct SearchOptions {
     /// Gains are in score + doubt / 10. A hypothesis must not be more doubtful, unless it halves
     /// the score and the doubt is below a half. Errors of sensors and meshes make wrong sides of
     /// cans and bowls better by up to 0.07, so the initial pose decides there. A hypothesis with a
-    /// doubt of at most 0.02 needs no gain if its doubt is lower, and its score lower than that of
-    /// every other pose by 0.01. A pose is near up to an MSSD of a quarter of the diameter.
+    /// doubt of at most 0.02 needs no gain if its score is lower than that of every other pose by
+    /// 0.01. A pose is near up to an MSSD of a quarter of the diameter.
     pub near_gain: f64,
     /// The gain by which it must beat a local pose far from the initial pose.
     ///
