@@ -147,7 +147,8 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_stage("color-choice", |p| {
         p.about = "Lets color decide between the pose of a stage and others that explain the depth \
             as well; without colors, or within a search, it is that stage. Cost: the stage; where \
-            depth leaves a choice, three times the polish and some milliseconds.";
+            depth leaves a choice, up to six times the polish, the stage without its search, and \
+            some milliseconds.";
         let stage = p.part::<BoxedStage>("stage", None, "finds a pose")?;
         let polish = p.part::<BoxedStage>("polish", None, "moves poses to depth and colors")?;
         let score = p.part::<BoxedScore>("score", "mve", "judges the depth")?;

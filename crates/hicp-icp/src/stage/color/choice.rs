@@ -67,8 +67,8 @@ const ALTERNATIVES: usize = 4;
 const PERFECT: f64 = 0.95;
 /// Share of the depth's score that another pose may add to it.
 const TOLERANCE: f64 = 0.2;
-/// Largest MSSD of a base from a pose that is ranked already, as a share of the diameter.
-const SAME_BASE: f64 = 0.04;
+/// MSSD up to which two candidates count as the same, as a share of the diameter.
+const SAME: f64 = 0.04;
 /// Number of poses of a ranking that are polished.
 const POLISHED: usize = 3;
 /// Number of best ranked candidates whose colors are compared in a render.
@@ -112,7 +112,7 @@ impl<S, P, C> ColorChoice<S, P, C> {
             .take(ALTERNATIVES)
             .map(|other| other.camera_from_object);
         let bases: Vec<_> = std::iter::once(*pose).chain(found).collect();
-        let limit = SAME_BASE * model.diameter();
+        let limit = SAME * model.diameter();
         for base in &bases {
             // The motions of an earlier base may contain this one.
             let same = |known: &Isometry3<f64>| distinct.mssd(known, base) < limit;
@@ -180,9 +180,8 @@ impl<S: Stage, P: Stage, C: Score> ColorChoice<S, P, C> {
         let mut iterations =
             outcome.iterations + self.polish_all(problem, &starts, &mut tried, session);
         if !tried.is_sure() {
-            let compared = self.compare(problem, distinct, session);
-            let new = |start: &&(f64, Isometry3<f64>)| starts.iter().all(|old| old.1 != start.1);
-            let compared: Vec<_> = compared.iter().filter(new).copied().collect();
+            let mut compared = self.compare(problem, distinct, session);
+            compared.retain(|(_, pose)| starts.iter().all(|(_, polished)| polished != pose));
             iterations += self.polish_all(problem, &compared, &mut tried, session);
         }
         if !tried.all().any(|tried| tried.color.is_telling()) {
@@ -215,11 +214,14 @@ impl<S: Stage, P: Stage, C: Score> ColorChoice<S, P, C> {
         distinct: &Distinct,
         session: &mut Session<'_>,
     ) -> Vec<(f64, Isometry3<f64>)> {
-        let limit = SAME_BASE * problem.model().map_or(0.0, Model::diameter);
+        let limit = SAME * problem.model().map_or(0.0, Model::diameter);
         let (mut compared, mut best) = (Vec::with_capacity(COMPARED), Vec::new());
         for (_, pose) in &self.ranked {
+            if compared.len() == COMPARED {
+                break;
+            }
             let same = |other: &Isometry3<f64>| distinct.mssd(other, pose) < limit;
-            if compared.len() == COMPARED || compared.iter().any(same) {
+            if compared.iter().any(same) {
                 continue;
             }
             compared.push(*pose);
@@ -238,7 +240,7 @@ impl<S: Stage, P: Stage, C: Score> ColorChoice<S, P, C> {
         session: &mut Session<'_>,
     ) -> Measured {
         let (pose, distinct) = (chosen.pose(), tried.distinct);
-        let same = SAME_BASE * problem.model().map_or(0.0, Model::diameter);
+        let same = SAME * problem.model().map_or(0.0, Model::diameter);
         let is_near = |other: &Isometry3<f64>| {
             distinct.mssd(other, pose) > same && !distinct.apart(other, pose)
         };
@@ -251,14 +253,19 @@ impl<S: Stage, P: Stage, C: Score> ColorChoice<S, P, C> {
         let outcome = chosen.outcome.then(next);
         let fitted = &outcome.camera_from_object;
         let score = self.score.score(&mut session.context(problem), fitted);
-        if score > chosen.score || distinct.apart(fitted, pose) {
-            return *chosen;
+        if score <= chosen.score && !distinct.apart(fitted, pose) {
+            return Measured {
+                score,
+                outcome,
+                ..*chosen
+            };
         }
-        Measured {
-            score,
-            outcome,
-            ..*chosen
-        }
+        // The iterations were spent.
+        let outcome = Outcome {
+            iterations: outcome.iterations,
+            ..chosen.outcome
+        };
+        Measured { outcome, ..*chosen }
     }
 
     /// Polishes poses until the colors of one agree so well that no other is needed.
