@@ -15,8 +15,8 @@ use crate::error::{IoError, IoErrorKind, Place};
 /// Memory within the defaults:
 ///
 /// - A mesh needs the size of its file, plus about 60 bytes per vertex and 40 bytes per triangle.
-/// - An image needs the size of its file, plus four bytes per pixel.
-/// - A JSON file needs a few times its size.
+/// - An image needs the size of its file, plus 2 to 16 bytes per sample of its pixels.
+/// - A JSON file needs up to several dozen times its size.
 ///
 /// ```
 /// use hicp_io::{LengthUnit, ReadLimits};
@@ -33,13 +33,13 @@ use crate::error::{IoError, IoErrorKind, Place};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReadLimits {
-    /// Maximum size in bytes of any file except JSON: 1 GiB.
+    /// Maximum size in bytes of any file for which there is no other limit: 1 GiB.
     pub max_file_bytes: u64,
     /// Maximum size in bytes of a JSON file: 256 MiB.
     pub max_json_bytes: u64,
-    /// Maximum size in bytes of a JSON file with a single item: 16 MiB.
+    /// Maximum size in bytes of a file with a single item: 16 MiB.
     ///
-    /// Examples are a pose, a camera and the configuration of a study.
+    /// It applies to poses and cameras in any format, and to the configuration of a study.
     pub max_small_json_bytes: u64,
     /// Maximum number of vertices of a mesh or a point cloud: 10 million. Meshes are always limited
     /// by `hicp_core::MAX_MESH_ELEMENTS`, too.

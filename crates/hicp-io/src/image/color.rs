@@ -12,15 +12,20 @@ use crate::limits::ReadLimits;
 #[cfg(feature = "tiff")]
 use crate::number::byte;
 
-/// Reads a color image from a PNG file of any pixel type, or from a JPEG or TIFF file.
+/// Reads a color image from a PNG, JPEG or TIFF file.
 ///
-/// The first bytes select the format. Gray values are repeated, 16-bit samples lose their low byte,
-/// and transparency is dropped. JPEG needs the feature `jpeg`, and TIFF the feature `tiff`.
+/// The first bytes select the format. Gray values are repeated for the three channels, 16-bit
+/// samples are reduced to 8 bits, and transparency is dropped. JPEG needs the feature `jpeg`, and
+/// TIFF the feature `tiff`.
 ///
 /// # Errors
 ///
 /// As for [`read_depth_png`](crate::read_depth_png), except for the errors about scale and pixel
-/// type. Also if the file has another format, or 16-bit gray pixels, as depth images have.
+/// type. Also in these cases:
+///
+/// - The file has another format.
+/// - The pixels are 16-bit gray, as in depth images.
+/// - The file is a TIFF image with floating-point or palette colors.
 pub fn read_color(path: impl AsRef<Path>) -> Result<ColorImage, IoError> {
     ReadLimits::DEFAULT.read_color(path)
 }

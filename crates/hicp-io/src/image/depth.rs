@@ -67,19 +67,25 @@ const FORMATS: &str = "PNG, TIFF, NPY, NPZ, EXR, PGM or PFM";
 
 /// Reads a depth image of any supported format, recognized by its first bytes.
 ///
-/// - PNG, PGM and TIFF: 16-bit gray.
-/// - TIFF, NPY, NPZ, EXR and PFM: floating point of 16, 32 or 64 bits; NPY and NPZ also integers.
+/// - PNG and PGM: 16-bit gray.
+/// - TIFF, NPY and NPZ: integers of 16 to 64 bits, or floating point.
+/// - EXR: integers of 32 bits, or floating point.
+/// - PFM: floating point.
 ///
-/// 0, NaN, infinity and negative numbers mean missing, and so does 65535 in 16 bits.
+/// 0, NaN, infinity and negative numbers mean missing. In 16-bit integers, 65535 does, too.
+///
 /// `millimeters_per_unit` is the depth of one unit. `None` means that the numbers are meters, which
-/// only floating point can be. Of an EXR file, the channel `Z` or `depth` counts, also that of a
-/// layer, or the only channel. Of an NPZ archive, the array `depth` counts, or else `image`, `data`
-/// or `arr_0`, or the only array.
+/// requires floating point. Of an EXR file, the channel `Z` or `depth` is read, also that of a
+/// layer, or the only channel. Of an NPZ archive, the only array is read, or else `depth`, `image`,
+/// `data` or `arr_0`.
 ///
 /// # Errors
 ///
-/// As for [`read_depth_png`]. Also if the numbers are integers and there is no unit, or if the
-/// format needs a cargo feature that is off.
+/// As for [`read_depth_png`], except for its pixel type. Also in these cases:
+///
+/// - The pixels are colors, or integers of fewer than 16 bits.
+/// - The numbers are integers, and `millimeters_per_unit` is `None`.
+/// - The format needs a cargo feature that is off.
 pub fn read_depth(
     path: impl AsRef<Path>,
     millimeters_per_unit: Option<f64>,

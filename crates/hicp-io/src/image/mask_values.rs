@@ -16,7 +16,7 @@ const FORMATS: &str = "PNG, TIFF, BMP, NPY, NPZ or PGM";
 /// The pixels of a mask that belong to the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MaskRule {
-    /// Every value but 0.
+    /// Every value but 0; in a palette image, every color but black and transparent ones.
     #[default]
     NotZero,
     /// Every value of at least this number, for probabilities and soft masks.
@@ -26,8 +26,9 @@ pub enum MaskRule {
 }
 
 impl MaskRule {
-    /// The value of a pixel of color: this plus 65536 · red + 256 · green + blue, each from 0 to
-    /// 255.
+    /// Start of the values of colored pixels.
+    ///
+    /// The value of a color is this plus 65536 · red + 256 · green + blue, each from 0 to 255.
     pub const COLOR: f64 = 16_777_216.0;
 }
 
@@ -36,22 +37,30 @@ impl MaskRule {
 pub struct MaskFile {
     /// The mask.
     pub mask: Mask,
-    /// For [`MaskRule::NotZero`]: the values and the options that choose among them, if there are
-    /// more than two values or none is 0.
+    /// A message with the values and the options that choose among them, for
+    /// [`MaskRule::NotZero`].
+    ///
+    /// `None` if the file has a single value, or two values of which one is the background.
     pub warning: Option<String>,
-    /// With a warning: the distinct values but 0 in ascending order, at most 256.
+    /// With a warning: the distinct values without the background, ascending, at most 256.
+    /// Otherwise empty.
     pub values: Vec<f64>,
-    /// The least value on the object if the mask is soft: 0 if some values are negative, or else
-    /// half of the largest value.
+    /// With a warning: the least value on the object if the mask is soft. Otherwise 0.
+    ///
+    /// It is 0 if some values are negative, 1 if there are colors, and otherwise half of the
+    /// largest value, rounded.
     pub threshold: f64,
 }
 
 /// Reads a mask of any supported format, recognized by its first bytes.
 ///
-/// `rule` selects the pixels of the object by their value. The value of a pixel is its gray value,
-/// or in a palette image its index. Colors that are not gray have values from [`MaskRule::COLOR`].
-/// If the opacity of an image varies, it is the value instead; an opaque image has its colors. Of
-/// an NPZ archive, the array `mask` counts, or else `image`, `data` or `arr_0`, or the only array.
+/// `rule` selects the pixels of the object by their value:
+///
+/// - The value of a pixel is its gray value, or in a palette image its index.
+/// - Colors that are not gray have values from [`MaskRule::COLOR`] on.
+/// - If the opacity varies within the image, the opacity is the value.
+///
+/// Of an NPZ archive, the only array is read, or else `mask`, `image`, `data` or `arr_0`.
 ///
 /// # Errors
 ///
