@@ -24,8 +24,9 @@ use crate::error::IoError;
 ///
 /// # Errors
 ///
-/// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write), also if the parent folder does not
-/// exist.
+/// [`IoError`] of the kind [`Write`](crate::IoErrorKind::Write). Also if the parent folder does not
+/// exist, or if a path in `/dev` or `/proc` leads to a regular file, such as `/dev/stdout` after
+/// `> file`.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

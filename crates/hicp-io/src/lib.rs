@@ -5,7 +5,8 @@
 //! the types of `hicp-core`, and to write them. It is not a general mesh or image library: it keeps
 //! geometry and the color of the surface, and drops all other properties of materials.
 //!
-//! - Units: files may be in millimeters; every returned value is in meters and seconds.
+//! - Units: files may be in millimeters. Values in memory are in meters and seconds, unless their
+//!   names state another unit.
 //! - Errors: for any content, a reader returns a value or an [`IoError`]. The error names the file,
 //!   the place in it, the value found and the value expected.
 //! - Safety: no reader panics or allocates more memory than the size of the file justifies.

@@ -66,7 +66,7 @@ impl Dataset {
         self
     }
 
-    /// Takes the meshes from another folder: one of the dataset, such as `models_color`, or a path.
+    /// Reads the meshes from another folder: one of the dataset, such as `models_color`, or a path.
     ///
     /// Diameters and symmetries still come from [`Dataset::models_info_path`].
     ///

@@ -26,7 +26,9 @@ pub struct Detection {
     /// Box in pixels: x, y, width, height.
     #[serde(default, deserialize_with = "optional_numbers")]
     pub bbox: Option<[f64; 4]>,
-    /// Run-length code of the mask, decoded by [`Rle::to_mask`]; `None` also for an empty array.
+    /// Run-length code of the mask, decoded by [`Rle::to_mask`].
+    ///
+    /// An empty array, as box detectors write it, becomes `None`.
     #[serde(default, deserialize_with = "not_empty")]
     pub segmentation: Option<Rle>,
     /// Time spent on the image in seconds, if known.

@@ -102,7 +102,8 @@ impl TryFrom<AxisRecord> for Axis {
 ///
 /// # Errors
 ///
-/// [`IoError`] names the JSON key of the fault, also if a symmetry is not a rigid motion.
+/// [`IoError`] names the JSON key of the fault, also if a symmetry is not a rigid motion, or if the
+/// symmetries of an object expand to more than `hicp_core::MAX_SYMMETRY_MOTIONS` motions.
 pub fn read_models_info(path: impl AsRef<Path>) -> Result<BTreeMap<u32, ModelInfo>, IoError> {
     ReadLimits::DEFAULT.read_models_info(path)
 }

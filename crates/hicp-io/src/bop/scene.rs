@@ -38,8 +38,8 @@ impl Scene {
 
     /// Opens a scene as [`Scene::open`] does, and reads its JSON files and images within `limits`.
     ///
-    /// With `sensor`, its files and folders end with this name, such as `scene_gt_cam1.json` and
-    /// `depth_cam1`.
+    /// With a `sensor`, the names of its files and folders end with it. For `cam1`, these are
+    /// `scene_gt_cam1.json` and `depth_cam1`.
     ///
     /// # Errors
     ///

@@ -15,7 +15,8 @@ use crate::pose::pose_to_bop;
 
 /// Writes a `scene_camera.json`: the cameras of a scene per image.
 ///
-/// Lengths are converted to millimeters. Apart from that, every number is read back exactly.
+/// Lengths are converted to millimeters. Apart from that, every number is read back exactly. The
+/// image size is not written.
 ///
 /// # Errors
 ///

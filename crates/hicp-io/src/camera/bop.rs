@@ -16,7 +16,7 @@ use crate::limits::{Limit, ReadLimits};
 use crate::pose::Rotation;
 use crate::source::text_bytes;
 
-/// The content of a camera file: the camera, and the unit of its depth images if stated.
+/// The content of a camera file: the camera, its distortion, and the unit of its depth images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraFile {
     /// The camera.
@@ -130,18 +130,19 @@ fn has_number(value: &Value) -> bool {
 
 /// Reads a camera from a JSON file, for images of `image_size` (width, height) in pixels.
 ///
-/// Supports four forms and ignores other keys:
+/// Supports four forms and ignores unknown keys:
 ///
 /// - `{"cam_K": [9 numbers, row-major], "depth_scale": ...}`, BOP's form without a size. A stated
 ///   size must match.
 /// - `{"cam_model": {...}, "depth_scale": ...}`, BOP's newer form. The model has a
 ///   `projection_model_type` such as `"PinholePlane"`, and `projection_params`
-///   `[fx, fy, cx, cy]`. Models with distortion are refused.
+///   `[fx, fy, cx, cy]` or `[f, cx, cy]`. Models with distortion are refused.
 /// - `{"fx", "fy", "cx", "cy", "width", "height", "depth_scale"}`, the form of BOP's `camera.json`.
 ///   Its size must match.
 /// - `{"7": {...}}`, a `scene_camera.json` of exactly one image in any of these forms.
 ///
-/// `depth_scale` is optional in all forms.
+/// `depth_scale` is optional in all forms. Distortion coefficients that are not 0 are refused;
+/// [`read_camera`](crate::read_camera) accepts them next to `cam_K`.
 ///
 /// # Errors
 ///

@@ -23,7 +23,7 @@ pub(super) fn is_distortion(key: &str, value: &Value) -> bool {
     is_known && is_stated
 }
 
-/// A lens distortion: where the ray through a point of the ideal image plane really hits the image.
+/// A lens distortion: maps a point of the ideal image plane to its place in the real image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distortion {
     /// Brown–Conrady with k1, k2, p1, p2, k3, k4, k5, k6 in OpenCV's order, `plumb_bob` and
@@ -70,6 +70,8 @@ impl Distortion {
     }
 
     /// Removes the distortion from a mask of `camera`, with the nearest pixel.
+    ///
+    /// A pixel that the real image does not show becomes background.
     #[must_use]
     pub fn undistort_mask(&self, camera: &PinholeCamera, mask: &Mask) -> Mask {
         let (width, height) = mask.size();

@@ -54,12 +54,12 @@ const REALSENSE: [&str; 6] = [
 /// - ROS's `camera_info` as YAML or JSON, with `K`, `D` and the model.
 /// - OpenCV's YAML and XML with `camera_matrix` and `distortion_coefficients`, and NPZ with `mtx`
 ///   and `dist`.
-/// - RealSense's and similar files with fx, fy, ppx and ppy. Of several streams, `depth` counts.
+/// - RealSense's and similar files with fx, fy, ppx and ppy. Of several streams, `depth` is read.
 /// - Open3D's `intrinsic_matrix`.
 ///
 /// `depth_scale` is in millimeters per unit; next to `ppx` or `f_u`, it is in meters per unit, as
-/// those programs write it. Distortions whose numbers are all 0 are dropped. BOP's forms may state
-/// one, too.
+/// those programs write it. Distortions whose numbers are all 0 are dropped. A distortion may also
+/// be next to BOP's `cam_K`, but not next to its `cam_model`.
 ///
 /// # Errors
 ///

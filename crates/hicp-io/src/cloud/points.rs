@@ -16,7 +16,9 @@ pub struct PointCloud {
     /// One unit normal per point, or none at all.
     pub normals: Option<Vec<UnitVector3<f32>>>,
     /// Number of points of the file that were skipped: they are not finite, or have no normal where
-    /// others have one. In the clouds of images, pixels without a measurement do not count.
+    /// others have one.
+    ///
+    /// It is 0 for clouds with the rows and columns of an image, in which gaps are common.
     pub n_skipped: usize,
 }
 

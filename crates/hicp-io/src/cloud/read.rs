@@ -19,13 +19,13 @@ const EXPECTED: &str = "a point cloud as PLY, PCD, XYZ, CSV or NPY";
 /// - PCD: text, binary and compressed, with `x`, `y`, `z` and, if there, `normal_x`, `normal_y` and
 ///   `normal_z`. The viewpoint is not applied.
 /// - Text (XYZ, CSV, PTS): one point per line, separated by white space, commas or semicolons. The
-///   names of the columns may come first. An empty cell is as NaN.
-/// - NPY and NPZ: an array whose last axis has the coordinates. Of several arrays, `points` counts,
-///   or else `xyz`, `positions`, `cloud` or `arr_0`.
+///   names of the columns may come first. An empty cell means NaN.
+/// - NPY and NPZ: an array whose last axis has the coordinates. Of several arrays, `points` is
+///   read, or else `xyz`, `positions`, `cloud` or `arr_0`.
 ///
 /// Columns 4 to 6 without names are normals if all of them have length 1. Points that are not
-/// finite are skipped, as sensors write them where nothing was measured. So are those without a
-/// normal, such as (0, 0, 0), if others have one. If none has one, the cloud has no normals.
+/// finite are skipped, because sensors write them for pixels without a measurement. If some points
+/// have a normal, those without one, such as (0, 0, 0), are skipped, too.
 ///
 /// # Errors
 ///

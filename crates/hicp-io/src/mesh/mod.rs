@@ -29,18 +29,18 @@ pub use write::{write_obj, write_ply};
 /// Reads a triangle mesh; the extension selects the format.
 ///
 /// The extension is `.glb`, `.gltf`, `.obj`, `.off`, `.ply` or `.stl`, in upper or lower case.
-/// Normals, lines and points are skipped.
-/// All objects and groups of a file become one mesh. Polygons are triangulated, concave ones by ear
-/// clipping.
+/// Normals, lines and points are skipped. All objects and groups of a file become one mesh.
+/// Polygons are triangulated, concave ones by ear clipping.
 ///
-/// Coordinates are converted from `unit` to meters in `f64` and then rounded to `f32`. STL files
-/// already hold `f32`.
+/// Coordinates are converted from `unit` to meters in `f64` and then rounded to `f32`. Binary STL
+/// files already hold `f32`.
 ///
 /// - GLB and glTF: triangles, strips and fans of the default scene, with the transforms of its
-///   nodes; also quantized and sparse. The unit of the format is the meter, and y is up; the axes
-///   stay. Draco and meshopt compression, skins, morphed shapes, and unknown extensions that a file
-///   requires are refused. Buffers are read from files next to it. The
-///   color is the base color of the materials, times their textures or `COLOR_0`.
+///   nodes; also quantized and sparse. The unit of the format is the meter, so pass
+///   [`LengthUnit::Meters`]. Its y axis is up, and the axes stay. Draco and meshopt compression,
+///   skins, morphed shapes, and unknown extensions that a file requires are refused. Buffers are
+///   read from files next to it. The color is the base color of the materials, times their textures
+///   or `COLOR_0`.
 /// - OBJ: relative indices, continued lines, comments after a record and any line ending are
 ///   accepted. Vertices that no face uses are dropped. The color is `map_Kd` or `Kd` of the
 ///   materials; without materials, that of the vertices (`v x y z red green blue`).
@@ -69,7 +69,8 @@ pub use write::{write_obj, write_ply};
 /// [`IoError`] names the file and the place of the fault. The faults are:
 ///
 /// - The file is not a regular file, is above a limit, or has an unknown extension.
-/// - The text is not UTF-8.
+/// - The first bytes show another format than the extension.
+/// - The text is UTF-16 or UTF-32.
 /// - The file is malformed or truncated, or its header announces more data than the file holds.
 /// - The file has no faces, or a face refers to a vertex that does not exist.
 /// - A coordinate is not finite or exceeds `hicp_core::MAX_COORDINATE_METERS`.

@@ -11,7 +11,7 @@ use crate::unit::LengthUnit;
 
 /// Writes a mesh as binary little-endian PLY with coordinates in `unit`.
 ///
-/// In meters, the coordinates are written exactly.
+/// In meters, the coordinates are written exactly. Colors are not written.
 ///
 /// # Errors
 ///
@@ -23,7 +23,7 @@ pub fn write_ply(path: impl AsRef<Path>, mesh: &TriMesh, unit: LengthUnit) -> Re
 
 /// Writes a mesh as OBJ with coordinates in `unit`.
 ///
-/// In meters, the coordinates are read back exactly.
+/// In meters, the coordinates are read back exactly. Colors are not written.
 ///
 /// # Errors
 ///
