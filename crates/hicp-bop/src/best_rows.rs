@@ -13,7 +13,8 @@ use crate::frames::Targets;
 /// With `targets`, rows without a target are dropped, and `inst_count` rows of every target are
 /// kept, as in the benchmark's toolkit. The result contains exactly the rows that an evaluation
 /// uses. With `top`, at most `top` rows per image and object are kept. Of equal scores, the first
-/// is kept. With neither, all rows are kept. A row may be a value that contains a [`ResultRow`].
+/// is kept. Without both options, all rows are kept. A row may be a value that contains a
+/// [`ResultRow`].
 ///
 /// Cost: O(n log n).
 ///

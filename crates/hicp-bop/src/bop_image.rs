@@ -182,8 +182,9 @@ impl<'a> BopImage<'a> {
     ///
     /// # Errors
     ///
-    /// [`RowStatus::NoMask`] without both, [`RowStatus::NothingMeasured`] if no depth was measured
-    /// inside, [`RowStatus::Damaged`] if the mask has another size than the depth image.
+    /// - [`RowStatus::NoMask`] if the detection has neither a mask nor a box.
+    /// - [`RowStatus::NothingMeasured`] if no depth was measured inside.
+    /// - [`RowStatus::Damaged`] if the mask has another size than the depth image.
     pub fn observe_detection(&mut self, detection: &Detection) -> Result<Observation, RowStatus> {
         let source = Source::of(detection).ok_or(RowStatus::NoMask)?;
         let mask = source.read(&self.image);

@@ -46,6 +46,10 @@ impl DatasetRefiner {
     /// the arguments.
     ///
     /// Memory: the image, the masks of the objects in its rows, and one observation per used mask.
+    ///
+    /// # Panics
+    ///
+    /// Panics if an index is beyond `rows`.
     pub fn frame(
         &self,
         refiner: &mut Refiner,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub enum FaultKind {
     /// A file is missing. This is common, because many users have only a part of a dataset.
     Missing,
-    /// A mask of an image is missing.
+    /// A mask of an image is missing, or the ground truth that lists its masks.
     MissingMask,
     /// A file exists but cannot be used.
     Damaged,

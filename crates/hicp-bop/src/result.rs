@@ -129,8 +129,8 @@ impl FrameResult {
     /// Returns rows with the alternatives of each row, best first.
     ///
     /// `rows` are those of [`Self::enter`]. At most `count` rows are returned for each. Their score
-    /// is the lowest of the refined rows of the object, minus their gap. An evaluation that asks
-    /// for as many poses as there are instances then takes the best pose of each instance first.
+    /// is the lowest of the refined rows of the object, minus their gap. An evaluation that keeps
+    /// the best poses of an object therefore prefers the refined rows to their alternatives.
     pub fn alternatives(
         &self,
         rows: &[ResultRow],

@@ -22,7 +22,8 @@ pub enum RowStatus {
     NoMask,
     /// At the row's pose, the model covers no pixel of any mask of its object.
     NoOverlap,
-    /// There are no measurements in the box around the row's pose ([`crate::MaskSource::Box`]).
+    /// There are no measurements in the box around the row's pose ([`crate::MaskSource::Box`]), or
+    /// in the mask of its detection ([`crate::MaskSource::OfRows`]).
     NothingMeasured,
     /// A file that the row needs is damaged.
     Damaged,

@@ -292,7 +292,7 @@ impl CaseMaker {
     /// Draws initial poses, and occasionally another object pose, until one falls into the bin.
     ///
     /// `draw` draws the object poses. Drawing both for every try would favor object poses for which
-    /// the bin is easy to hit.
+    /// the bin is easy to hit. If no try of [`VsdBins`] falls into the bin, returns `None`.
     pub fn start_in_bin(
         &mut self,
         model: &Model,

@@ -135,9 +135,9 @@ impl Clutter {
 
     /// Returns camera poses along a path, as poses of the world in the camera frame, meters.
     ///
-    /// The path starts at a random direction, at 1.5 times the distance at which all objects just
-    /// fit. In equal steps, the camera approaches and moves around the scene by 40°. It always
-    /// looks at the center.
+    /// The path starts in a random direction, at 1.5 times the distance at which all objects just
+    /// fit. In equal steps, the camera approaches to 0.9 times that distance and moves around the
+    /// scene by 40°. It always looks at the center.
     pub fn path(
         &self,
         rng: &mut SimRng,

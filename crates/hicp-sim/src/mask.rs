@@ -34,7 +34,8 @@ impl MaskDefects {
     ///
     /// # Errors
     ///
-    /// [`SimError::Parameter`] if the share is not in [0, 1] or a radius is above 256 pixels.
+    /// [`SimError::Parameter`] if the share or the threshold is not in [0, 1], or a radius is above
+    /// 256 pixels.
     pub fn apply(&self, rng: &mut SimRng, mask: &Mask) -> Result<Mask, SimError> {
         check_range("missing share of the mask", self.missing_share, 0.0..=1.0)?;
         check_range("threshold of the soft mask", self.soft_threshold, 0.0..=1.0)?;

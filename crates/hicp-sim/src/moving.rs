@@ -52,7 +52,7 @@ pub struct MovingConfig {
 }
 
 impl Default for MovingConfig {
-    /// 60 frames with three standing objects and no hand.
+    /// Returns 60 frames with three standing objects and no hand.
     fn default() -> Self {
         Self {
             trajectory: Trajectory::default(),

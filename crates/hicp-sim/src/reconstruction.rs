@@ -34,11 +34,12 @@ pub struct ReconstructionNoise {
 /// The pose that is wrong in each image of a reconstruction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum WrongPose {
-    /// The object's pose: the errors of rotation turn the object about its origin (§VI-B.3).
+    /// The object's pose: the errors rotate the object around its origin (§VI-B.3).
     #[default]
     Object,
-    /// The camera's pose: the errors of rotation turn the camera about its center, and move the
-    /// surface more the farther it is away (§VI-C.2).
+    /// The camera's pose: the errors rotate the camera around its center (§VI-C.2).
+    ///
+    /// They move the surface in proportion to its distance.
     Camera,
 }
 

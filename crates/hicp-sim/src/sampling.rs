@@ -35,8 +35,9 @@ pub fn rotation(rng: &mut SimRng) -> UnitQuaternion<f64> {
 
 /// Draws an object pose (`camera_from_object`), in meters, in any orientation (§VI-A.3).
 ///
-/// The distance is uniform in `distances` meters. The optical axis passes within `offset` meters of
-/// the object's center, so the object is never exactly in the center of the image.
+/// The distance of the object's center along the optical axis is uniform in `distances`, meters.
+/// The optical axis passes within `offset` meters of the center. `center` is in the object frame,
+/// meters.
 pub fn object_pose(
     rng: &mut SimRng,
     center: &Point3<f64>,

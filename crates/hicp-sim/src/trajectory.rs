@@ -17,7 +17,7 @@ const WAVES: usize = 2;
 /// The limits of a smooth random motion.
 ///
 /// The velocity and the angular velocity are each a sum of two waves with periods of 2 to 4 s. The
-/// highest speed of a motion is half of the limit to all of it.
+/// highest speed of a motion is drawn between half of the limit and the limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trajectory {
     /// Largest speed of the object's center, m/s.
@@ -29,7 +29,7 @@ pub struct Trajectory {
 }
 
 impl Default for Trajectory {
-    /// 0.3 m/s, 90°/s and 30 poses per second.
+    /// Returns 0.3 m/s, 90°/s and 30 poses per second.
     fn default() -> Self {
         Self {
             meters_per_second: 0.3,

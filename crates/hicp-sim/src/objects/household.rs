@@ -47,7 +47,7 @@ pub enum Household {
     Pan,
     /// A can. It is symmetric under any rotation around its axis and when turned upside down.
     Can,
-    /// An open laptop: two thin plates at an angle, one slightly thicker.
+    /// An open laptop: two thin plates at an angle, one twice as thick as the other.
     Laptop,
     /// A teapot: a round body with a spout and a handle.
     Teapot,

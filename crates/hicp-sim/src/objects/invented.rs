@@ -17,8 +17,8 @@ use crate::{SimRng, rotation};
 ///
 /// It has a body and up to three smaller parts. The body is solid or hollow and round, a box, or a
 /// plate or column with any outline. The parts are handles, rods, boxes and knobs at its side. The
-/// diameter is 0.08 to 0.3 m in the nominal proportions. Ten categories of [`crate::Household`] do
-/// not show how shapes vary; use these to fit something that has to work for every object.
+/// diameter is 0.08 to 0.3 m in the nominal proportions. Use these objects to fit parameters that
+/// must suit every object: the ten tuning objects of [`crate::Household`] have too little variety.
 ///
 /// # Errors
 ///

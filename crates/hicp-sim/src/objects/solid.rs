@@ -165,6 +165,13 @@ impl Solid {
     }
 
     /// Sweeps a circle of radius `tube` along a path and closes both ends with flat caps.
+    ///
+    /// Lengths are in meters. The path has at least two different points, and no part of it runs
+    /// along the y axis. `steps` is the number of segments of the circle.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the path is empty.
     #[must_use]
     pub fn sweep(path: &[Point3<f64>], tube: f64, steps: usize) -> Self {
         let mut solid = Self::new();

@@ -35,8 +35,8 @@ impl RelativeGaussian {
 
 /// A noise model by name, for studies, files and command lines.
 ///
-/// All models draw one number per measured pixel, in row-major order. With the same stream, images
-/// of different models and levels therefore use the same deviates and differ only in their scale.
+/// All models except `None` draw one number per measured pixel, in row-major order. With the same
+/// stream, images of different models and levels therefore use the same deviates.
 ///
 /// ```
 /// use hicp_sim::DepthNoise;
