@@ -18,7 +18,8 @@ impl Picture {
     /// Shows the depth around an object with the model's outlines at some poses, and their
     /// captions.
     ///
-    /// The last pose is the result; there may be one before it.
+    /// A single pose is the result. Of two poses, the second is the result. Further poses have no
+    /// outline.
     ///
     /// The picture contains the mask and all silhouettes, with a margin. Poses are
     /// `camera_from_object`, meters.

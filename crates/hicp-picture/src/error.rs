@@ -20,10 +20,10 @@ pub enum PictureError {
         /// The number of rows.
         rows: u64,
     },
-    /// The part of an image that is shown.
+    /// A picture or the shown part of an image has a size that no camera can have.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// The part of an image that is shown.
+    /// The shown part of an image is not a valid image.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// A picture cannot be encoded.

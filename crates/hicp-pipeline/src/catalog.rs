@@ -122,7 +122,7 @@ impl Catalog {
         self.entries.iter().map(|entry| &entry.part)
     }
 
-    /// Writes the catalog as a page of Markdown, such as `docs/catalogue.md`.
+    /// Returns the catalog as a page of Markdown, such as `docs/catalogue.md`.
     #[must_use]
     pub fn page(&self) -> String {
         let mut page = String::from(HEADING);

@@ -55,7 +55,7 @@ pub enum PipelineErrorKind {
     Value,
     /// More work than [`PipelineLimits`](crate::PipelineLimits) allow.
     Limit,
-    /// An override that is not of the form `path=value`, or whose path leads nowhere.
+    /// An override that is not of the form `path=value`, or whose path does not exist.
     Override,
 }
 

@@ -66,15 +66,16 @@ impl PipelineFile {
         Ok(file)
     }
 
-    /// Overrides a field: `path=value`, where the path is dotted with list indices from 0, and the
-    /// value is TOML or a bare word. A first key that the pipeline lacks, but its inner `stage`
-    /// has, is that of the inner stage: `milliseconds` of the preset `color` is
-    /// `stage.milliseconds`.
+    /// Overrides a field by an assignment of the form `path=value`.
+    ///
+    /// The path has dots between its keys, and list indices from 0. The value is TOML or a bare
+    /// word. If the pipeline lacks the first key, but its inner `stage` has it, the path starts at
+    /// that stage: `milliseconds` of the preset `color` is `stage.milliseconds`.
     ///
     /// # Errors
     ///
-    /// [`PipelineErrorKind::Override`] if the path leads nowhere. A field that the part does not
-    /// have is refused by building.
+    /// [`PipelineErrorKind::Override`] if the assignment has another form, or if all but the last
+    /// key of the path do not exist. An unknown last key is reported when the pipeline is built.
     pub fn set(&mut self, assignment: &str) -> Result<(), PipelineError> {
         self.overrides.push(assignment.to_owned());
         let outcome = self.root().map(|_| ());
@@ -84,7 +85,7 @@ impl PipelineFile {
         outcome
     }
 
-    /// Builds the pipeline: the same parts as a struct literal, boxed, with the same bits.
+    /// Builds the pipeline. Its results have the bits of the same parts composed in Rust.
     ///
     /// # Errors
     ///

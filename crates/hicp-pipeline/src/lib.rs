@@ -4,8 +4,8 @@
 //! fields are the parameters of that part. A part may be given by its bare name if none of its
 //! parameters is set.
 //!
-//! **Should you use this crate?** Through `hybrid_icp::pipeline`, unless you write a program that
-//! only checks or lists pipeline files.
+//! **Should you use this crate?** Use it through `hybrid_icp::pipeline`, unless you write a program
+//! that only checks or lists pipeline files.
 //!
 //! ```
 //! use hicp_pipeline::PipelineFile;

@@ -32,7 +32,7 @@ pub struct PipelineLimits {
     pub max_iterations: u64,
     /// Hypotheses of a search: 100 000.
     pub max_hypotheses: u64,
-    /// Points that an association or a score samples on the model: 1 million, of 24 bytes each.
+    /// Points that a part samples on the model: 1 million, of 24 bytes each.
     pub max_samples: u64,
     /// Neighbors of a point that an association considers: 100. All of them may become pairs.
     pub max_neighbors: u64,

@@ -1,4 +1,4 @@
-//! The work that a pipeline may take, held against the limits.
+//! The work that a pipeline may take, checked against the limits.
 
 use toml::de::DeValue;
 
@@ -38,17 +38,17 @@ impl Parameters<'_> {
         Ok(count as usize)
     }
 
-    /// States that the part runs its inner parts, which were read before, up to so many times.
+    /// Declares that the part runs its inner parts, which were read before, up to `times` times.
     ///
-    /// `field` is the parameter that says so. A part that does not call this counts as running the
-    /// longest of its inner parts once.
+    /// `field` is the parameter with this number. A part that does not call this method counts as
+    /// running the longest of its inner parts once.
     pub fn repeats(&mut self, field: &'static str, times: usize) -> Result<(), PipelineError> {
         let inner = self.inner.iter().map(|(_, iterations)| *iterations).max();
         let total = inner.unwrap_or(1).max(1).saturating_mul(times as u64);
         self.takes(field, total)
     }
 
-    /// States the iterations that the part may take; `field` is the parameter that says so.
+    /// Declares the iterations that the part may take; `field` is the parameter with their number.
     pub(crate) fn takes(&mut self, field: &str, iterations: u64) -> Result<(), PipelineError> {
         self.iterations = Some(iterations);
         let limit = (self.limits().max_iterations, "max_iterations");
@@ -62,7 +62,7 @@ impl Parameters<'_> {
         inner.map(|(_, iterations)| *iterations)
     }
 
-    /// States that a stage ends after so many iterations, by this rule.
+    /// Declares that this rule ends a stage after a number of iterations.
     pub(crate) fn ends_after(&mut self, iterations: usize) {
         self.iterations = Some(iterations as u64);
     }

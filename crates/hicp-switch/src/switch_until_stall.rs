@@ -10,8 +10,8 @@ use crate::switcher::Switcher;
 /// A step starts from the best pose so far. It runs the stage that the switcher selects there, as
 /// in [`Switch`](crate::Switch). The score is that of the switcher, which is lower if a pose is
 /// better. A step that lowers the score by less than `min_gain` is a stall. Then the other stage is
-/// tried once, and if that is a stall, too, the iteration ends. It also ends if the score is at or
-/// below `good_enough`, but not before the first step.
+/// tried once. If that is a stall, too, no further steps follow. Nor do they if the score is at or
+/// below `good_enough`, except for the first step.
 ///
 /// **Contract**: the score of the returned pose is never above that of the initial one. Unless its
 /// score is lower, the returned pose is the initial one, bit for bit. This includes a switcher

@@ -9,10 +9,10 @@ use crate::scenes::{Case, cases, sides};
 /// The laws that [`check_renderer`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RendererLaws {
-    /// Largest share of pixels that may differ from [`Rasterizer`]; 2 % by default.
+    /// Largest share of the covered pixels that may differ from [`Rasterizer`]; 2 % by default.
     ///
-    /// A pixel differs if its depth is more than 1 mm off, or if only one of the two renders has a
-    /// depth. `None` for renderers that do not draw the mesh.
+    /// A pixel is covered if one of the two renders has a depth. It differs if only one has, or if
+    /// the depths are more than 1 mm apart. `None` for renderers that do not draw the mesh.
     pub differing_pixels: Option<f64>,
 }
 

@@ -10,7 +10,8 @@ use crate::law::{BOXED, PURE, Subject};
 /// The laws that [`check_stop_rule`] checks beyond the contract of the trait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StopRuleLaws {
-    /// Equal runs give equal verdicts. False only for rules that read the clock.
+    /// Equal runs give equal verdicts. False only for rules that read the clock, which are only
+    /// checked for panics.
     pub deterministic: bool,
 }
 
