@@ -18,8 +18,8 @@ pub enum ClaimVerdict {
     Equivalent,
     /// The study cannot decide.
     Undecided {
-        /// About the number of cases that would decide it, if objects increase alike; `None` if no
-        /// number can be stated.
+        /// The approximate number of cases that would decide it, if the number of objects grows in
+        /// proportion; `None` if no number can be stated.
         cases: Option<usize>,
     },
 }
@@ -101,7 +101,7 @@ fn cases_needed(interval: Interval, tolerance: f64) -> Option<usize> {
 /// A claim with its verdict.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
-    /// The section of the paper; `aim` if the claim is not the paper's.
+    /// The section of the paper; `aim` or `beyond §V` if the claim is not in the paper.
     pub section: &'static str,
     /// The claim, stated as it was tested.
     pub text: String,

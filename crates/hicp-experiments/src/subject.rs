@@ -37,9 +37,9 @@ impl Subject {
         made.collect()
     }
 
-    /// Reads every mesh file of a folder, in meters, in alphabetical order.
+    /// Reads the OBJ, OFF, PLY and STL files of a folder, in meters, in alphabetical order.
     ///
-    /// The objects have no symmetries.
+    /// Other files, also GLB and glTF, are skipped. The objects have no symmetries.
     ///
     /// # Errors
     ///

@@ -44,8 +44,8 @@ pub(crate) struct Arguments {
     /// Unit of the coordinates of the target, if it is another one.
     #[arg(long, value_name = "UNIT")]
     target_unit: Option<LengthUnit>,
-    /// The rough pose, source to target, in the forms of `refine`. If not given, the clouds are
-    /// taken as they are.
+    /// The rough pose, source to target, in the forms of `refine`. If not given, the clouds start
+    /// where they are.
     #[arg(long, value_name = "FILE")]
     init: Option<PathBuf>,
     /// Unit of the translation of --init: m, mm or cm. If not given: mm for cam_t_m2c, m for all

@@ -93,7 +93,8 @@ pub struct TrajectoryConfig {
 pub enum TrajectoryClock {
     /// A stored cost per underlying pipeline, by default the mean of the paper's Table I.
     ///
-    /// All methods of a pipeline see the same images, and two runs give the same bytes.
+    /// Methods of a pipeline whose estimates take equally long see the same images. Two runs give
+    /// the same bytes.
     #[default]
     Cost,
     /// The measured processor time from depth image to fused pose.
@@ -195,10 +196,11 @@ impl TrajectoryConfig {
 
     /// Returns the improved protocol, which differs from the paper's.
     ///
-    /// Covariances are e_MVE·U about the object, and nothing is fused if ICP finds no pairs. All
-    /// methods of a pipeline see the same images. The images of the reconstructions have no noise,
-    /// and the object's poses in them are off. The camera moves toward a point within 5 cm of the
-    /// object's center.
+    /// - Covariances are e_MVE·U around the object's center, and nothing is fused if ICP finds no
+    ///   pairs.
+    /// - All methods of a pipeline see the same images.
+    /// - The images of the reconstructions have no noise, and the object's poses in them are off.
+    /// - The camera moves toward a point within 5 cm of the object's center.
     #[must_use]
     pub fn improved(mut self) -> Self {
         // Deviation: direction of the path: §VI-C.1 moves the camera along its optical axis.

@@ -17,7 +17,8 @@ use serde::{Deserialize, Serialize};
 pub enum PlainCovariance {
     /// e_MVE·I₆, which stays as it is when the camera moves (§V).
     Identity,
-    /// e_MVE·U with the unit covariance U about the object, moved by the adjoint.
+    /// e_MVE·U with the unit covariance U around the object's center, transformed by the adjoint
+    /// when the camera moves.
     AboutObject,
 }
 

@@ -5,8 +5,9 @@ use hicp_sim::{Corruption, DepthNoise, RelativeGaussian};
 /// The conditions under which a case is presented.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
-    /// If `true`, initial poses are drawn into bins of the initial VSD (§VI-B.1). If `false`, they
-    /// are 6.2 mm and 9.5° off.
+    /// `true` if initial poses are drawn into bins of the initial VSD (§VI-B.1).
+    ///
+    /// Otherwise their errors have the size in the configuration, by default 6.2 mm and 9.5°.
     pub binned: bool,
     /// The imperfections of the image and the mask.
     pub corruption: Corruption,

@@ -14,7 +14,8 @@ pub struct Row {
     pub setting: String,
     /// The variant: a pipeline, or a method that fuses estimates.
     pub variant: String,
-    /// Bin of the initial VSD, from 0, where cases are binned.
+    /// Bin of the initial VSD, from 0. `None` if cases are not binned, or if the case could not be
+    /// created.
     pub bin: Option<usize>,
     /// The figures; `None` if the case could not be created.
     pub measured: Option<Measured>,

@@ -27,7 +27,8 @@ impl<D: Design> StudyOf<D> {
     /// # Errors
     ///
     /// [`ExperimentError`] when a file is missing, exceeds the default limits, or does not come
-    /// from [`run`](crate::run). It states the field of the configuration or the line of the rows.
+    /// from [`run`](crate::run). Also if no row is finished. It states the field of the
+    /// configuration or the line of the rows.
     pub fn read(folder: &Path) -> Result<Self, ExperimentError> {
         Self::read_within(&ReadLimits::DEFAULT, folder)
     }

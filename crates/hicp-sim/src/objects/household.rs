@@ -11,8 +11,8 @@ use crate::stream::stream;
 
 /// A procedural household object with declared symmetries.
 ///
-/// Objects have 0.08 to 0.3 m and 2,000 to 10,000 triangles. Each part of an object is closed.
-/// Parts (a mug's wall and its handle) overlap instead of being joined.
+/// Diameters are 0.08 to 0.3 m. Meshes have 2,000 to 10,000 triangles. Each part of an object is
+/// closed. Parts (a mug's wall and its handle) overlap instead of being joined.
 ///
 /// The shapes are those on which ICP variants differ: thin walls, handles, near-symmetric bodies,
 /// flat boxes, concave bowls, thin plates. There are twenty categories, like the twenty `ShapeNet`

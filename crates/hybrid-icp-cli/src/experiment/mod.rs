@@ -23,7 +23,7 @@ use crate::terminal::warn;
 /// All variants get the same images and initial poses. A study writes its exact configuration to
 /// `config.json`, and one row per case, level and variant to `cases.csv` as soon as a case is
 /// finished. At the end it summarizes them in `report.html`, `figure.svg`, `figure.png`,
-/// `summary.csv`, `differences.csv` and `claims.csv`.
+/// `summary.csv`, `switches.csv`, `differences.csv` and `claims.csv`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Robustness to the initial pose: ten equal bins of the initial VSD (§VI-B.1).

@@ -11,7 +11,8 @@ use super::study::{StudyOptions, report};
 /// Writes `config.json`, and one row per trajectory, pipeline and method to `trajectories.csv` as
 /// soon as a trajectory is finished. At the end it summarizes them in `report.html`, `figure.svg`,
 /// `figure.png`, `summary.csv`, `differences.csv`, `calibration.csv` and `claims.csv`. By default,
-/// all methods of a pipeline get the same images, and two runs give the same bytes; see --clock.
+/// two runs give the same bytes, and methods of a pipeline get the same images if their estimates
+/// take equally long; see --clock.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// The pipelines that compute the estimates; by default both that the paper uses.

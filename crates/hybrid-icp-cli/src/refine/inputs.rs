@@ -107,7 +107,8 @@ pub(crate) struct RegionOptions {
     #[command(flatten)]
     pub(super) mask_options: MaskOptions,
     /// Without a mask: a box around the object, in pixels: its left and upper side, width and
-    /// height. `hybrid`, `hybrid-visible` and the baselines take a table in it for the object.
+    /// height. `hybrid`, `hybrid-visible` and the baselines treat a table in it as part of the
+    /// object.
     #[arg(
         long,
         value_name = "X,Y,W,H",

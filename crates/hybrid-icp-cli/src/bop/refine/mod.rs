@@ -25,7 +25,7 @@ use crate::outputs::{self, Files};
 
 /// Refine every row of a result file.
 ///
-/// The output has the same rows in the same order. Rows that cannot be refined keep their numbers
+/// The output has the same rows in the same order. Rows that cannot be refined keep their poses
 /// and are counted by reason at the end. The time column has the seconds spent on all rows of the
 /// image, added to the time in the input. If that is unknown (-1), it is the time of the refinement
 /// alone.

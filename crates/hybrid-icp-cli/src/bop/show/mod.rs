@@ -28,7 +28,7 @@ use crate::terminal::{say, table, warn};
 ///
 /// The picture is the color or gray image, or the depth if there is neither. Outlines are faint
 /// where a measured surface, or another model of the same file, is in front. The legend has the
-/// score of every estimate and its MVE in the mask that `bop refine` takes. If the dataset has
+/// score of every estimate and its MVE in the mask that `bop refine` uses. If the dataset has
 /// ground truth, it also has ADI and VSD (mean over the ten tolerances) against the nearest
 /// instance. The same table is printed.
 ///
@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     /// instances in the ground truth, and one without ground truth.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), allow_negative_numbers = true)]
     top: Option<u16>,
-    /// Take the masks of the MVE from a detections file (JSON with RLE segmentations) instead of
+    /// Read the masks of the MVE from a detections file (JSON with RLE segmentations) instead of
     /// mask_visib.
     #[arg(long, value_name = "FILE.json")]
     detections: Option<PathBuf>,
