@@ -16,8 +16,8 @@ use crate::results;
 
 /// Registers two point clouds: finds the pose that moves the source onto the target.
 ///
-/// Points that are not finite or at exactly (0, 0, 0) are skipped, with a warning in the result.
-/// Absent normals are estimated if the method needs them, which is a warning, too. Ctrl-C stops it.
+/// Points that are not finite or at exactly (0, 0, 0) are skipped. Absent normals are estimated if
+/// the method needs them. Warnings in the result report both. Ctrl-C stops the call.
 ///
 /// Fitness and RMSE do not prove the pose: a can slides around its axis, and a box on its wrong
 /// side can fit better than the truth. Start from a rough pose, and read the warning about
@@ -138,7 +138,8 @@ pub(crate) fn align<'py>(
 /// Returns
 /// -------
 /// points : numpy.ndarray, shape (N, 3), float32
-///     Points, meters. Those that are not finite are left out.
+///     Points, meters. Those that are not finite are left out, and those without a normal if others
+///     have one.
 /// normals : numpy.ndarray, shape (N, 3), float32, or None
 ///     Their normals, if the file has them.
 ///

@@ -92,11 +92,10 @@ pub(crate) fn result_header() -> String {
 /// color : bool, optional
 ///     Use the colors of the meshes and the images in rgb/ if both exist.
 /// sensor : str, optional
-///     The sensor of scenes with several, such as "cam1" for
-///     scene_camera_cam1.json and depth_cam1/.
+///     The sensor of scenes with several: "cam1" for scene_camera_cam1.json and depth_cam1/.
 /// rescore : {"keep", "mve", "confidence"}, optional
-///     The score of a refined row: its old score, 1 − MVE, or its
-///     confidence.
+///     The score of a row: its old score, 1 − MVE, or its confidence. With the last two, a row
+///     that did not reach the pipeline has the score 0.
 #[pyclass(frozen, module = "hybrid_icp.bop", name = "DatasetRefiner")]
 pub(crate) struct PyDatasetRefiner {
     shared: DatasetRefiner,
@@ -177,7 +176,7 @@ impl PyDatasetRefiner {
 
     /// Refines the rows of one image.
     ///
-    /// Rows that cannot be refined keep their numbers. The time column is -1, so that equal input
+    /// Rows that cannot be refined keep their poses. The time column is -1, so that equal input
     /// gives equal bytes.
     ///
     /// Parameters
@@ -232,7 +231,7 @@ impl PyDatasetRefiner {
     }
 
     /// The faults of models, as a dict from object id to message. Rows of these objects keep their
-    /// numbers.
+    /// poses.
     #[getter]
     fn broken_models(&self) -> std::collections::BTreeMap<u32, String> {
         self.shared.models.broken.clone()

@@ -12,6 +12,7 @@ use crate::errors::InputError;
 /// Computes one step of point-to-point ICP on given pairs.
 ///
 /// The step is the rigid motion that minimizes Σ|T pᵢ − cᵢ|² (Kabsch).
+/// Of the steps that fit pairs on a line equally well, it has the smallest rotation.
 ///
 /// Parameters
 /// ----------
@@ -30,8 +31,8 @@ use crate::errors::InputError;
 /// Raises
 /// ------
 /// InputError
-///     If there are fewer than three pairs, or numbers that are not finite. Of the steps that fit
-///     pairs on a line equally well, the one with the smallest rotation is returned.
+///     If there are fewer than three pairs, numbers that are not finite, or different numbers of
+///     sources and targets.
 ///
 /// Examples
 /// --------
@@ -52,6 +53,7 @@ pub(crate) fn point_to_point_step(
 /// Computes one step of point-to-plane ICP on given pairs.
 ///
 /// The step is a Gauss–Newton step on Σ(nᵢ·(T pᵢ − cᵢ))².
+/// Directions that the normals do not determine are damped, so they hardly move.
 ///
 /// Parameters
 /// ----------
@@ -73,8 +75,8 @@ pub(crate) fn point_to_point_step(
 /// Raises
 /// ------
 /// InputError
-///     If there are fewer than six pairs, or numbers that are not finite. Directions that the
-///     normals do not determine are damped, so they hardly move.
+///     If there are fewer than six pairs, numbers that are not finite, normals of length 0, or
+///     different numbers of rows.
 #[pyfunction]
 pub(crate) fn point_to_plane_step(
     sources: &Bound<'_, PyAny>,

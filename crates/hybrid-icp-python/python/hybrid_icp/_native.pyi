@@ -245,15 +245,16 @@ class DepthImage:
         FileError
             If the file cannot be read or is not such an image.
         InputError
-            If `scale` is wrong, or the depths in it cannot be meters.
+            If `scale` is wrong, or if the depths at this scale cannot be meters.
         """
 
     @staticmethod
     def from_points(points: npt.ArrayLike, camera: Camera, T_cp: npt.ArrayLike | None=None) -> DepthImage:
-        """Projects the points of a depth sensor into a camera; the nearest point of a pixel counts.
+        """Projects the points of a depth sensor into a camera.
 
-        Pixels without points are missing. `Observation(image, image.to_numpy() > 0, camera)` is
-        the observation of a cloud that shows the object alone.
+        A pixel has the depth of its nearest point, and is missing without points.
+        `Observation(image, image.to_numpy() > 0, camera)` is the observation of a cloud that shows
+        the object alone.
 
         Parameters
         ----------
@@ -266,6 +267,11 @@ class DepthImage:
         Returns
         -------
         DepthImage
+
+        Raises
+        ------
+        InputError
+            If the depths cannot be meters, such as those of points in millimeters.
 
         Warns
         -----
@@ -1000,8 +1006,8 @@ class Fuser:
     max_mve, max_mahalanobis_squared : float, optional
         The gate. Estimates above one of these limits are rejected.
     restart_after : int, optional
-        Number of consecutive estimates too far from the fused estimate after which the fuser starts
-        again.
+        Number of consecutive estimates above `max_mahalanobis_squared` after which the fuser starts
+        again. Without that limit, it has no effect.
     window : int, optional
         Maximum number of estimates that "average" and "weighted-average" keep, the newest ones.
     transport : {"adjoint", "kept"}, optional
@@ -1086,11 +1092,12 @@ class SequentialEstimator:
         camera. Otherwise uncertainty refers to the center of the object, estimates with an MVE
         above 0.4 are rejected, and symmetric poses are fused as one.
     covariance : {"mve", "calibrated"}, optional
-        Covariance of the estimates. "calibrated", the default and excluded by `paper`, is about as
-        wide as the errors: the covariance of the registration, with factors that were fitted to
-        "hybrid" and to models reconstructed from images. It also rejects estimates with an MVE
-        above 0.25, and those that are far from the fused pose. "mve" is a weight: the MVE in units
-        of the object. It compares images and is not calibrated, so do not use it as an error.
+        Covariance of the estimates. "calibrated" is the default, unless `paper` is true, which
+        requires "mve". It is about as wide as the errors: the covariance of the registration, with
+        factors that were fitted to "hybrid" and to models reconstructed from images. It also
+        rejects estimates with an MVE above 0.25, and those that are far from the fused pose. "mve"
+        is a weight: the MVE in units of the object. It is not calibrated, so do not use it as an
+        error.
         `bop sequence` names them `--uncertainty registration` and `--uncertainty mve`.
     """
 
@@ -1212,7 +1219,7 @@ class Tracker:
         mask : numpy.ndarray, shape (H, W), optional
             Pixels to which the object is restricted. Not needed.
         scale : float, optional
-            Meters per unit of a uint16 image.
+            Meters per unit of an image of integers.
 
         Returns
         -------
@@ -1236,8 +1243,8 @@ class Tracker:
 def align(source: _Points, target: _Points, T_ts: npt.ArrayLike | None=None, *, source_normals: npt.ArrayLike | None=None, target_normals: npt.ArrayLike | None=None, method: Literal['point-to-plane', 'point-to-point', 'gicp']='point-to-plane', max_distance: float | None=None, voxel: float | None=None, neighbors: int=20) -> Alignment:
     """Registers two point clouds: finds the pose that moves the source onto the target.
 
-    Points that are not finite or at exactly (0, 0, 0) are skipped, with a warning in the result.
-    Absent normals are estimated if the method needs them, which is a warning, too. Ctrl-C stops it.
+    Points that are not finite or at exactly (0, 0, 0) are skipped. Absent normals are estimated if
+    the method needs them. Warnings in the result report both. Ctrl-C stops the call.
 
     Fitness and RMSE do not prove the pose: a can slides around its axis, and a box on its wrong
     side can fit better than the truth. Start from a rough pose, and read the warning about
@@ -1441,8 +1448,8 @@ def run_program(words: Sequence[str]) -> int:
 def mask_in_box(bbox: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.bool_]:
     """Returns the mask of a box, for a detector without a segmentation.
 
-    `local`, `search`, `auto`, `color` and `estimate` give a table in the box no weight.
-    `hybrid`, `hybrid-visible` and the baselines take it for the object.
+    The presets `local`, `search`, `auto` and `color`, and `estimate`, give no weight to a table in
+    the box. `hybrid`, `hybrid-visible` and the baselines treat it as part of the object.
 
     Parameters
     ----------
@@ -1461,6 +1468,11 @@ def mask_in_box(bbox: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.bool_]:
     ------
     InputError
         If `bbox` does not have four numbers, or the box has no pixel in the image.
+
+    Warns
+    -----
+    InputWarning
+        If `bbox` looks like two corners, or like fractions of the image.
 
     Examples
     --------
@@ -1532,6 +1544,7 @@ def point_to_point_step(sources: npt.ArrayLike, targets: npt.ArrayLike) -> tuple
     """Computes one step of point-to-point ICP on given pairs.
 
     The step is the rigid motion that minimizes Σ|T pᵢ − cᵢ|² (Kabsch).
+    Of the steps that fit pairs on a line equally well, it has the smallest rotation.
 
     Parameters
     ----------
@@ -1550,8 +1563,8 @@ def point_to_point_step(sources: npt.ArrayLike, targets: npt.ArrayLike) -> tuple
     Raises
     ------
     InputError
-        If there are fewer than three pairs, or numbers that are not finite. Of the steps that fit
-        pairs on a line equally well, the one with the smallest rotation is returned.
+        If there are fewer than three pairs, numbers that are not finite, or different numbers of
+        sources and targets.
 
     Examples
     --------
@@ -1567,6 +1580,7 @@ def point_to_plane_step(sources: npt.ArrayLike, targets: npt.ArrayLike, normals:
     """Computes one step of point-to-plane ICP on given pairs.
 
     The step is a Gauss–Newton step on Σ(nᵢ·(T pᵢ − cᵢ))².
+    Directions that the normals do not determine are damped, so they hardly move.
 
     Parameters
     ----------
@@ -1588,8 +1602,8 @@ def point_to_plane_step(sources: npt.ArrayLike, targets: npt.ArrayLike, normals:
     Raises
     ------
     InputError
-        If there are fewer than six pairs, or numbers that are not finite. Directions that the
-        normals do not determine are damped, so they hardly move.
+        If there are fewer than six pairs, numbers that are not finite, normals of length 0, or
+        different numbers of rows.
     """
 
 def read_cloud(path: _Path, unit: _Unit='m') -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32] | None]:
@@ -1606,7 +1620,8 @@ def read_cloud(path: _Path, unit: _Unit='m') -> tuple[npt.NDArray[np.float32], n
     Returns
     -------
     points : numpy.ndarray, shape (N, 3), float32
-        Points, meters. Those that are not finite are left out.
+        Points, meters. Those that are not finite are left out, and those without a normal if others
+        have one.
     normals : numpy.ndarray, shape (N, 3), float32, or None
         Their normals, if the file has them.
 
@@ -1638,7 +1653,7 @@ def read_depth(path: _Path, *, scale: float | None=None) -> npt.NDArray[np.float
     FileError
         If the file cannot be read, is not such an image, or has integers and `scale` is missing.
     InputError
-        If `scale` is wrong, or the depths in it cannot be meters.
+        If `scale` is wrong, or if the depths at this scale cannot be meters.
     """
 
 def read_depth_png(path: _Path, scale: float) -> npt.NDArray[np.float32]:
@@ -1673,13 +1688,20 @@ def read_mask(path: _Path, *, threshold: float | None=None, value: float | None=
     Returns
     -------
     numpy.ndarray, shape (H, W), bool
-        Pixels that are not 0, unless `threshold` or `value` is passed. A file with more than two
-        values then raises an InputWarning.
+        Without `threshold` and `value`: the pixels that are not 0, and in palette images those that
+        are neither black nor transparent.
 
     Raises
     ------
     FileError
         If the file cannot be read, is not such an image, or has no pixel of the stated value.
+    InputError
+        If both `threshold` and `value` are passed.
+
+    Warns
+    -----
+    InputWarning
+        If neither is passed, and the file has more than two values.
     """
 
 def read_mask_png(path: _Path) -> npt.NDArray[np.bool_]:
@@ -1695,10 +1717,10 @@ def read_mask_png(path: _Path) -> npt.NDArray[np.bool_]:
     """
 
 def read_pose(path: _Path, *, unit: _Unit | None=None) -> _Array:
-    """Reads a pose from a JSON, YAML, text, NPY or NPZ file.
+    """Reads a pose from a JSON, YAML, XML, text, NPY or NPZ file.
 
     The file has a 4x4 or 3x4 matrix, BOP's `cam_R_m2c` and `cam_t_m2c`, a rotation and a
-    translation, a translation and a quaternion of stated order, or a TUM line.
+    translation, a translation and a quaternion of stated order or an `rvec`, or a TUM line.
 
     Parameters
     ----------
@@ -1766,11 +1788,10 @@ class DatasetRefiner:
     color : bool, optional
         Use the colors of the meshes and the images in rgb/ if both exist.
     sensor : str, optional
-        The sensor of scenes with several, such as "cam1" for
-        scene_camera_cam1.json and depth_cam1/.
+        The sensor of scenes with several: "cam1" for scene_camera_cam1.json and depth_cam1/.
     rescore : {"keep", "mve", "confidence"}, optional
-        The score of a refined row: its old score, 1 − MVE, or its
-        confidence.
+        The score of a row: its old score, 1 − MVE, or its confidence. With the last two, a row
+        that did not reach the pipeline has the score 0.
     """
 
     def __new__(cls, dataset: _Path, split: str, pipeline: Pipeline, objects: Sequence[int], *, detections: _Path | None=None, mask: Literal['visible', 'none']='visible', models: _Path | None=None, color: bool=True, sensor: str | None=None, rescore: Literal['keep', 'mve', 'confidence']='keep') -> DatasetRefiner:
@@ -1779,7 +1800,7 @@ class DatasetRefiner:
     def refine(self, rows: str) -> tuple[list[str], list[str], list[str]]:
         """Refines the rows of one image.
 
-        Rows that cannot be refined keep their numbers. The time column is -1, so that equal input
+        Rows that cannot be refined keep their poses. The time column is -1, so that equal input
         gives equal bytes.
 
         Parameters
@@ -1800,7 +1821,7 @@ class DatasetRefiner:
     @property
     def broken_models(self) -> dict[int, str]:
         """The faults of models, as a dict from object id to message. Rows of these objects keep their
-        numbers.
+        poses.
         """
 
     @property

@@ -24,7 +24,7 @@ class Alternative(TypedDict):
     - `score`: the score of the search; lower is better.
     - `gap`: the score minus that of the returned pose.
     - `color_gap`: the agreement of the colors at the returned pose minus that at this one, as
-      correlations; None if there are no colors, or none that tell poses apart.
+      correlations; None if there are no colors, or if they do not distinguish the poses.
     - `mssd`: distance from the returned pose, meters.
     - `rotation_degrees`: angle to the returned pose.
     """

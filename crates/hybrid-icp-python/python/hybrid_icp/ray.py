@@ -102,12 +102,13 @@ def refine(
     sensor : str, optional
         The sensor of scenes with several, such as "cam1".
     rescore : {"keep", "mve", "confidence"}, optional
-        The score of a refined row: its old score, 1 - MVE, or its confidence.
+        The score of a row: its old score, 1 - MVE, or its confidence. With the last two, a row that
+        did not reach the pipeline has the score 0.
     workers : int, optional
         Number of actors, with one thread each. The default is the number of CPUs of the cluster.
     num_cpus : float, optional
-        CPUs that an actor reserves. With 1, actors on every CPU would leave no room for the tasks
-        that feed them, and would wait forever.
+        CPUs that an actor reserves. With 1 and an actor on every CPU, the tasks that feed the
+        actors could not run, and the actors would wait forever.
     rows_per_task : int, optional
         Minimum number of rows of a task. Images are never split. If a worker dies, this work is
         repeated.
@@ -127,7 +128,7 @@ def refine(
     ------
     InputError
         If a file of the dataset is damaged. The output is written nevertheless, and rows that need
-        the file are unchanged.
+        the file keep their poses.
     """
     pipeline = pipeline or Pipeline()
     path = Path(results)

@@ -90,7 +90,7 @@ impl PyDepthImage {
     /// FileError
     ///     If the file cannot be read or is not such an image.
     /// InputError
-    ///     If `scale` is wrong, or the depths in it cannot be meters.
+    ///     If `scale` is wrong, or if the depths at this scale cannot be meters.
     #[staticmethod]
     pub(crate) fn from_png(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<Self> {
         let millimeters = millimeters(scale)?;
@@ -100,10 +100,11 @@ impl PyDepthImage {
         Ok(Self(Arc::new(image)))
     }
 
-    /// Projects the points of a depth sensor into a camera; the nearest point of a pixel counts.
+    /// Projects the points of a depth sensor into a camera.
     ///
-    /// Pixels without points are missing. `Observation(image, image.to_numpy() > 0, camera)` is
-    /// the observation of a cloud that shows the object alone.
+    /// A pixel has the depth of its nearest point, and is missing without points.
+    /// `Observation(image, image.to_numpy() > 0, camera)` is the observation of a cloud that shows
+    /// the object alone.
     ///
     /// Parameters
     /// ----------
@@ -116,6 +117,11 @@ impl PyDepthImage {
     /// Returns
     /// -------
     /// DepthImage
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     If the depths cannot be meters, such as those of points in millimeters.
     ///
     /// Warns
     /// -----

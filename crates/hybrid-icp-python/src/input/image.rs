@@ -63,7 +63,7 @@ pub(crate) fn read_mask_png(py: Python<'_>, path: PathBuf) -> PyResult<Matrix<bo
 /// FileError
 ///     If the file cannot be read, is not such an image, or has integers and `scale` is missing.
 /// InputError
-///     If `scale` is wrong, or the depths in it cannot be meters.
+///     If `scale` is wrong, or if the depths at this scale cannot be meters.
 #[pyfunction]
 #[pyo3(signature = (path, *, scale = None))]
 pub(crate) fn read_depth(
@@ -104,13 +104,20 @@ pub(crate) fn read_depth(
 /// Returns
 /// -------
 /// numpy.ndarray, shape (H, W), bool
-///     Pixels that are not 0, unless `threshold` or `value` is passed. A file with more than two
-///     values then raises an InputWarning.
+///     Without `threshold` and `value`: the pixels that are not 0, and in palette images those that
+///     are neither black nor transparent.
 ///
 /// Raises
 /// ------
 /// FileError
 ///     If the file cannot be read, is not such an image, or has no pixel of the stated value.
+/// InputError
+///     If both `threshold` and `value` are passed.
+///
+/// Warns
+/// -----
+/// InputWarning
+///     If neither is passed, and the file has more than two values.
 #[pyfunction]
 #[pyo3(signature = (path, *, threshold = None, value = None))]
 pub(crate) fn read_mask(
@@ -139,10 +146,10 @@ pub(crate) fn read_mask(
     Ok(depth::image(file.mask.width(), file.mask.pixels()))
 }
 
-/// Reads a pose from a JSON, YAML, text, NPY or NPZ file.
+/// Reads a pose from a JSON, YAML, XML, text, NPY or NPZ file.
 ///
 /// The file has a 4x4 or 3x4 matrix, BOP's `cam_R_m2c` and `cam_t_m2c`, a rotation and a
-/// translation, a translation and a quaternion of stated order, or a TUM line.
+/// translation, a translation and a quaternion of stated order or an `rvec`, or a TUM line.
 ///
 /// Parameters
 /// ----------

@@ -48,8 +48,8 @@ fn check_size(
 
 /// Returns the mask of a box, for a detector without a segmentation.
 ///
-/// `local`, `search`, `auto`, `color` and `estimate` give a table in the box no weight.
-/// `hybrid`, `hybrid-visible` and the baselines take it for the object.
+/// The presets `local`, `search`, `auto` and `color`, and `estimate`, give no weight to a table in
+/// the box. `hybrid`, `hybrid-visible` and the baselines treat it as part of the object.
 ///
 /// Parameters
 /// ----------
@@ -68,6 +68,11 @@ fn check_size(
 /// ------
 /// InputError
 ///     If `bbox` does not have four numbers, or the box has no pixel in the image.
+///
+/// Warns
+/// -----
+/// InputWarning
+///     If `bbox` looks like two corners, or like fractions of the image.
 ///
 /// Examples
 /// --------

@@ -148,8 +148,8 @@ pub(crate) fn fuse(estimates: Vec<PyPoseEstimate>) -> PyResult<PyPoseEstimate> {
 /// max_mve, max_mahalanobis_squared : float, optional
 ///     The gate. Estimates above one of these limits are rejected.
 /// restart_after : int, optional
-///     Number of consecutive estimates too far from the fused estimate after which the fuser starts
-///     again.
+///     Number of consecutive estimates above `max_mahalanobis_squared` after which the fuser starts
+///     again. Without that limit, it has no effect.
 /// window : int, optional
 ///     Maximum number of estimates that "average" and "weighted-average" keep, the newest ones.
 /// transport : {"adjoint", "kept"}, optional

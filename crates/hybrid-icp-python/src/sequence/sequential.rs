@@ -34,11 +34,12 @@ use crate::sequence::fusion::{self, PyPoseEstimate};
 ///     camera. Otherwise uncertainty refers to the center of the object, estimates with an MVE
 ///     above 0.4 are rejected, and symmetric poses are fused as one.
 /// covariance : {"mve", "calibrated"}, optional
-///     Covariance of the estimates. "calibrated", the default and excluded by `paper`, is about as
-///     wide as the errors: the covariance of the registration, with factors that were fitted to
-///     "hybrid" and to models reconstructed from images. It also rejects estimates with an MVE
-///     above 0.25, and those that are far from the fused pose. "mve" is a weight: the MVE in units
-///     of the object. It compares images and is not calibrated, so do not use it as an error.
+///     Covariance of the estimates. "calibrated" is the default, unless `paper` is true, which
+///     requires "mve". It is about as wide as the errors: the covariance of the registration, with
+///     factors that were fitted to "hybrid" and to models reconstructed from images. It also
+///     rejects estimates with an MVE above 0.25, and those that are far from the fused pose. "mve"
+///     is a weight: the MVE in units of the object. It is not calibrated, so do not use it as an
+///     error.
 ///     `bop sequence` names them `--uncertainty registration` and `--uncertainty mve`.
 #[pyclass(frozen, module = "hybrid_icp", name = "SequentialEstimator")]
 pub(crate) struct PySequentialEstimator {

@@ -123,7 +123,7 @@ impl PyTracker {
     /// mask : numpy.ndarray, shape (H, W), optional
     ///     Pixels to which the object is restricted. Not needed.
     /// scale : float, optional
-    ///     Meters per unit of a uint16 image.
+    ///     Meters per unit of an image of integers.
     ///
     /// Returns
     /// -------
