@@ -44,7 +44,12 @@ pub(super) fn add(catalog: &mut Catalog) {
         p.about = "Pairs a point with the closest of its k nearest whose normal agrees. \
             Source: Pulli 1999. Cost: O(k n log m).";
         let half_turn = Range::new(0.0, 180.0, "degrees");
-        let angle = p.number("max_angle_degrees", half_turn, 45.0, "between the normals")?;
+        let angle = p.number(
+            "max_angle_degrees",
+            half_turn,
+            45.0,
+            "largest angle between the normals",
+        )?;
         Ok(NormalCompatible::new(angle, considered(p)?, searched(p)?))
     });
     catalog.add_association("normal-shooting", |p| {
@@ -59,8 +64,11 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_association("reciprocal", |p| {
         p.about = "Keeps the pairs of another association in which each is the other's closest. \
             Source: Pajdla & Van Gool 1995. Cost: that association, and O(n log n).";
-        let association =
-            p.part::<BoxedAssociation>("association", "nearest-neighbor", "to choose from")?;
+        let association = p.part::<BoxedAssociation>(
+            "association",
+            "nearest-neighbor",
+            "the association to filter",
+        )?;
         Ok(Reciprocal::new(association))
     });
     catalog.add_association("projective-search", |p| {
@@ -120,7 +128,7 @@ pub(super) fn add(catalog: &mut Catalog) {
                 "reach",
                 reach,
                 default.reach_diameters,
-                "of a line to each side",
+                "length of a line to each side",
             )?,
             p.number(
                 "weight",

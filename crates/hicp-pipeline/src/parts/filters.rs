@@ -44,7 +44,12 @@ pub(super) fn add(catalog: &mut Catalog) {
     catalog.add_filter("trimmed", |p| {
         p.about = "Keeps a share of the pairs, the closest. Source: Chetverikov et al. 2002. \
             Cost: O(n).";
-        Ok(Trimmed::new(p.number("keep", SHARE, 0.85, "kept")?))
+        Ok(Trimmed::new(p.number(
+            "keep",
+            SHARE,
+            0.85,
+            "share of the pairs to keep",
+        )?))
     });
     catalog.add_filter("var-trimmed", |p| {
         p.about = "Keeps the share of the pairs with the least fractional RMSD. Source: Phillips, \
@@ -70,15 +75,15 @@ pub(super) fn add(catalog: &mut Catalog) {
         })
     });
     catalog.add_filter("min-pairs", |p| {
-        p.about = "Removes every pair where there are too few. Cost: O(1).";
+        p.about = "Removes all pairs if there are fewer than a number. Cost: O(1).";
         Ok(MinPairs {
-            count: p.count("count", 0, 6, "fewer are too few")?,
+            count: p.count("count", 0, 6, "smallest number of pairs to keep")?,
         })
     });
     catalog.add_filter("constant-weight", |p| {
         p.about = "Multiplies weights by a number. Cost: O(n).";
         Ok(ConstantWeight {
-            weight: p.number("weight", FACTOR, 1.0, "the number")?,
+            weight: p.number("weight", FACTOR, 1.0, "factor of the weights")?,
         })
     });
     catalog.add_filter("distance-weight", |p| {
@@ -100,8 +105,18 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(SensorNoiseWeight {
             noise: SensorNoise {
                 constant: p.number("constant", METERS, 0.001_063, "deviation at depth 0")?,
-                linear: p.number("linear", FACTOR, 0.000_727_8, "and per meter of depth")?,
-                quadratic: p.number("quadratic", per_meter, 0.003_949, "and per m²")?,
+                linear: p.number(
+                    "linear",
+                    FACTOR,
+                    0.000_727_8,
+                    "deviation per meter of depth",
+                )?,
+                quadratic: p.number(
+                    "quadratic",
+                    per_meter,
+                    0.003_949,
+                    "deviation per m² of squared depth",
+                )?,
                 tilt: p.number("tilt", FACTOR, 0.0, "factor of the tilt term")?,
             },
         })

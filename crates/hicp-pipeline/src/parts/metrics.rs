@@ -62,7 +62,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         let constant = "tuning constant; 0 is the kernel's own, for 95 % efficiency";
         let tuning = p.number("tuning", Range::positive("σ"), 0.0, constant)?;
         let kernel = if tuning > 0.0 { tuned(tuning) } else { usual };
-        let scale = p.word("scale", &SCALES, "how σ is found")?;
+        let scale = p.word("scale", &SCALES, "source of σ")?;
         let meters = p.number("meters", METERS, 1e-3, "σ, or its least value for MAD")?;
         Ok(Robust::new(metric, kernel, scale(meters)))
     });
@@ -105,7 +105,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         let frames = [("camera", Frame::Camera), ("object", Frame::Object)];
         Ok(Frozen {
             metric: inner(p)?,
-            frame: p.word("frame", &frames, "whose axes")?,
+            frame: p.word("frame", &frames, "frame of the axes")?,
             translation: p.flags("translation", "x, y, z that do not move")?,
             rotation: p.flags("rotation", "x, y, z that do not rotate")?,
         })
@@ -124,8 +124,13 @@ pub(super) fn add(catalog: &mut Catalog) {
         let share = Range::new(0.0, 1.0, "share of the largest eigenvalue");
         Ok(Conditioned {
             metric: inner(p)?,
-            policy: p.word("policy", &policies, "what is done")?,
-            threshold: p.number("threshold", share, 1e-3, "undetermined below")?,
+            policy: p.word("policy", &policies, "treatment of these directions")?,
+            threshold: p.number(
+                "threshold",
+                share,
+                1e-3,
+                "a direction is undetermined below this",
+            )?,
         })
     });
     catalog.add_metric("gauss-newton", |p| {

@@ -27,7 +27,7 @@ pub(super) fn add(catalog: &mut Catalog) {
             cascade: V_O. Source: §III-A.1. Cost: a render, shared with the score, and O(pixels).";
         let stride = stride(p, 2000, KEPT)?;
         let poses = [("stage", SelectAt::Stage), ("cascade", SelectAt::Cascade)];
-        let at = p.word("at", &poses, "whose initial pose")?;
+        let at = p.word("at", &poses, "owner of the initial pose")?;
         Ok(VisibleSurface { stride, at })
     });
     catalog.add_selection("visible-side", |p| {

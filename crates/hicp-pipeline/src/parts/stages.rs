@@ -63,7 +63,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         p.about = "Runs a stage several times; ends early when it keeps its pose. Source: §IV-C. \
             Cost: times × the stage.";
         let times = p.count("times", 0, 2, "largest number of runs")?;
-        let stage = p.part::<BoxedStage>("stage", None, "what is repeated")?;
+        let stage = p.part::<BoxedStage>("stage", None, "the stage to repeat")?;
         p.repeats("times", times)?;
         Ok(Repeat { times, stage })
     });
@@ -177,14 +177,14 @@ pub(super) fn add(catalog: &mut Catalog) {
             unchanged. Source: image pyramids. Cost: the stage on a coarser image.";
         Ok(AtResolution {
             factor: p.count("factor", 1, 2, "keeps every n-th pixel")?,
-            stage: p.part::<BoxedStage>("stage", None, "what is run")?,
+            stage: p.part::<BoxedStage>("stage", None, "the stage to run")?,
         })
     });
     catalog.add_stage("guard", |p| {
         p.about = "Accepts the pose of a stage only if a score improves. Cost: the stage and two \
             scores.";
         Ok(Guard {
-            stage: p.part::<BoxedStage>("stage", None, "what is run")?,
+            stage: p.part::<BoxedStage>("stage", None, "the stage to run")?,
             score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
         })
     });
@@ -206,7 +206,7 @@ pub(super) fn add(catalog: &mut Catalog) {
             initial one. Cost: times × (the stage and a score).";
         let stage = KeepBest {
             times: p.count("times", 0, 2, "largest number of runs")?,
-            stage: p.part::<BoxedStage>("stage", None, "what is repeated")?,
+            stage: p.part::<BoxedStage>("stage", None, "the stage to repeat")?,
             score: p.part::<BoxedScore>("score", "mve", "judges poses")?,
         };
         p.repeats("times", stage.times)?;
@@ -227,7 +227,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(stage)
     });
     catalog.add_switcher("threshold", |p| {
-        p.about = "Misaligned where a score is α or more. Source: §IV-A.2. Cost: a score.";
+        p.about = "Selects misaligned if a score is at least α. Source: §IV-A.2. Cost: a score.";
         let of_score = Range::new(-INFINITY, INFINITY, "of the score");
         Ok(Threshold {
             score: p.part::<BoxedScore>("score", "mve", "the score")?,
@@ -235,7 +235,7 @@ pub(super) fn add(catalog: &mut Catalog) {
         })
     });
     catalog.add_switcher("thresholds", |p| {
-        p.about = "Selects regime k where exactly k bounds are at or below a score. \
+        p.about = "Selects regime k if exactly k bounds are at or below a score. \
             Source: §IV-A.2, generalized. Cost: a score.";
         let score = p.part::<BoxedScore>("score", "mve", "the score")?;
         let bounds = p.numbers("bounds", "bounds of the score, ascending")?;

@@ -27,7 +27,11 @@ pub(super) fn add(catalog: &mut Catalog) {
         ];
         Ok(Divergence {
             pairs_lost: p.number("pairs_lost", SHARE, 0.05, "pairs that may be lost")?,
-            loss_rule: p.word("loss_rule", &rules, "when a rising loss counts")?,
+            loss_rule: p.word(
+                "loss_rule",
+                &rules,
+                "condition under which a rising loss counts",
+            )?,
             rise_tolerance: p.number("rise_tolerance", RATIO, 1e-3, "relative rise to ignore")?,
         })
     });
@@ -87,7 +91,12 @@ pub(super) fn add(catalog: &mut Catalog) {
 /// A distance of the object's center and an angle.
 fn motion(p: &mut Parameters<'_>, meters: f64, degrees: f64) -> Result<(f64, f64), PipelineError> {
     Ok((
-        p.number("translation_meters", METERS, meters, "of the center")?,
-        p.number("rotation_degrees", DEGREES, degrees, "angle")?,
+        p.number(
+            "translation_meters",
+            METERS,
+            meters,
+            "translation of the object's center",
+        )?,
+        p.number("rotation_degrees", DEGREES, degrees, "rotation angle")?,
     ))
 }
