@@ -64,7 +64,7 @@ fn cold(criterion: &mut Criterion) {
 /// Measures `auto` from starts that it leaves by a search, and the estimate of a pose without a
 /// start.
 ///
-/// The starts are rotated by 180° around an axis across the view.
+/// The starts are rotated by 180° around the x axis of the object, through its center.
 fn search(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("pipeline");
     let mut refiner = Refiner::preset(Preset::Auto);
