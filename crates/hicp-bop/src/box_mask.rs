@@ -18,8 +18,9 @@ use hybrid_icp::core::{
 /// results (see `docs/results.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMask {
-    /// The growth of the boxes on every side, as a share of the longer side of the silhouette's box
-    /// and of the diameter.
+    /// The growth of the boxes on every side, relative to their size.
+    ///
+    /// The size is the longer side of the silhouette's box, and the diameter for the model's box.
     pub margin: f64,
 }
 

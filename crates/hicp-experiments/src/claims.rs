@@ -18,8 +18,9 @@ pub enum ClaimVerdict {
     Equivalent,
     /// The study cannot decide.
     Undecided {
-        /// The approximate number of cases that would decide it, if the number of objects grows in
-        /// proportion; `None` if no number can be stated.
+        /// The approximate number of cases that would decide it; `None` if it is unknown.
+        ///
+        /// It holds if the number of objects grows in proportion.
         cases: Option<usize>,
     },
 }

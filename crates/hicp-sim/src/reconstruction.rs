@@ -131,11 +131,11 @@ impl Reconstruction {
         }
     }
 
-    /// Returns the default truncation for a model, meters: three voxels plus two and a half
-    /// standard deviations of a measured surface along a ray.
+    /// Returns the default truncation for a model, meters.
     ///
-    /// The noise of the depth and the errors of the poses move a surface. The paper does not state
-    /// a truncation.
+    /// It is three voxels plus 2.5 standard deviations of a measured surface along a ray, because
+    /// the noise of the depth and the errors of the poses move the surface. The paper does not
+    /// state a truncation.
     #[must_use]
     pub fn truncation_meters(&self, model: &Model) -> f64 {
         let distance = f64::midpoint(model.diameter(), self.max_distance_meters);

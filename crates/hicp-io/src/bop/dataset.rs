@@ -106,10 +106,10 @@ impl Dataset {
         other.unwrap_or_else(|| self.first_dir(["models", "models_eval"]))
     }
 
-    /// Returns the path of the file of diameters and symmetries: `models_info.json` in `models`, or
-    /// in `models_eval` if it is the only folder. The file may not exist.
+    /// Returns the path of the file of diameters and symmetries. The file may not exist.
     ///
-    /// If the dataset has neither folder, the file is that of [`Dataset::with_models`].
+    /// It is `models_info.json` in `models`, or in `models_eval` if it is the only folder. If the
+    /// dataset has neither, it is in the folder of [`Dataset::with_models`].
     ///
     /// # Errors
     ///
@@ -148,10 +148,10 @@ impl Dataset {
         Ok(Self::model_path_in(&self.models_dir()?, obj_id))
     }
 
-    /// Returns the path of an object's mesh in a folder of models: `obj_000001.ply` for object 1,
-    /// or else `obj_000001.obj`, or one of them in the folder `obj_000001`.
+    /// Returns the path of an object's mesh in a folder of models.
     ///
-    /// If there is none, returns the first path.
+    /// For object 1, it is `obj_000001.ply`, or else `obj_000001.obj`, or one of them in the folder
+    /// `obj_000001`. If none of these files exists, returns the first path.
     #[must_use]
     pub fn model_path_in(models: &Path, obj_id: u32) -> PathBuf {
         let name = format!("obj_{obj_id:06}");

@@ -81,8 +81,10 @@ impl TryFrom<Numbers<9>> for Rotation {
 pub struct PoseFile {
     /// The pose, meters. Its rotation is the one nearest to the numbers of the file.
     pub camera_from_object: Isometry3<f64>,
-    /// The rotation matrix, row-major: the numbers of `cam_R_m2c` if the file has the form of
-    /// [`read_pose_json`] and is in millimeters, otherwise the matrix of the pose.
+    /// The rotation matrix, row-major.
+    ///
+    /// These are the numbers of `cam_R_m2c` if the file has the form of [`read_pose_json`] and is
+    /// in millimeters. Otherwise it is the matrix of the pose.
     pub rotation: [f64; 9],
     /// The translation, millimeters: the numbers of `cam_t_m2c` if they are in millimeters.
     pub translation_mm: [f64; 3],

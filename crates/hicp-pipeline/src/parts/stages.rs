@@ -108,8 +108,8 @@ pub(super) fn add(catalog: &mut Catalog) {
         Ok(stage)
     });
     catalog.add_stage("hypothesis-search", |p| {
-        p.about = "Runs a local stage; where its score stays bad, runs it again from the best of \
-            many rotations. Not local. Cost: the stage; where it fails hypotheses × ranking, \
+        p.about = "Runs a local stage; if its score stays bad, runs it again from the best of \
+            many rotations. Not local. Cost: the stage; if it fails, hypotheses × ranking, \
             aligned × align, refined × explore and up to half as many × finish.";
         let search = HypothesisSearch::new(
             p.part::<BoxedStage>("stage", None, "refines locally")?,
@@ -146,7 +146,7 @@ pub(super) fn add(catalog: &mut Catalog) {
     });
     catalog.add_stage("color-choice", |p| {
         p.about = "Lets color decide between the pose of a stage and others that explain the depth \
-            as well; without colors, or within a search, it is that stage. Cost: the stage; where \
+            as well; without colors, or within a search, it is that stage. Cost: the stage; if \
             depth leaves a choice, up to six times the polish, the stage without its search, and \
             some milliseconds.";
         let stage = p.part::<BoxedStage>("stage", None, "finds a pose")?;

@@ -27,9 +27,10 @@ pub(crate) struct Arguments {
     /// lists what differs.
     #[arg(long, value_enum, value_name = "PROTOCOL", default_value_t = Protocol::Paper)]
     protocol: Protocol,
-    /// The time of an estimate: cost is the mean of the paper's Table I, and real is the measured
-    /// processor time from depth image to fused pose. With real, no two runs are the same, and a
-    /// trajectory has thousands of images.
+    /// The time of an estimate. With cost, it is the mean of the paper's Table I, plus the share of
+    /// an MVE for methods that need one. With real, it is the measured processor time from depth
+    /// image to fused pose. Then no two runs are the same, and a trajectory has thousands of
+    /// images.
     #[arg(long, value_enum, value_name = "CLOCK", default_value_t = Clock::Cost)]
     clock: Clock,
     #[command(flatten)]

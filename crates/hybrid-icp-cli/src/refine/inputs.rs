@@ -35,9 +35,9 @@ pub(crate) struct ImageFiles {
     /// alone is ambiguous, and needs a mesh with colors or textures.
     #[arg(long, value_name = "FILE")]
     pub(crate) rgb: Option<PathBuf>,
-    /// The camera, as JSON, YAML, XML, text, NPY or NPZ: cam_K (nine numbers, row-major), fx, fy,
-    /// cx and cy, a 3x3 matrix, or a file of ROS, OpenCV, RealSense or Open3D. Pixel centers are
-    /// at integers. If it has lens distortion, the images are undistorted.
+    /// The camera, as JSON, YAML, XML, text, NPY or NPZ. The file has cam_K (nine numbers,
+    /// row-major), fx, fy, cx and cy, or a 3x3 matrix, or is of ROS, OpenCV, RealSense or Open3D.
+    /// Pixel centers are at integers. If it has lens distortion, the images are undistorted.
     #[arg(long, value_name = "FILE")]
     pub(crate) camera: PathBuf,
     /// The camera of the depth image, if it is another one than that of the mask. The depth is then
@@ -211,9 +211,9 @@ pub(crate) struct Inputs {
     pub(crate) files: ImageFiles,
     #[command(flatten)]
     pub(crate) region: RegionOptions,
-    /// The rough pose, model to camera: JSON with cam_R_m2c (nine numbers, row-major) and cam_t_m2c
-    /// (three numbers in mm); or a 4x4 matrix, R and t, or a translation and a quaternion of stated
-    /// order, as JSON, YAML, text, NPY or NPZ; or a TUM line (x y z qx qy qz qw).
+    /// The rough pose, model to camera, as JSON, YAML, XML, text, NPY or NPZ. The file has
+    /// cam_R_m2c (nine numbers, row-major) and cam_t_m2c (three numbers in mm), a 4x4 matrix, R and
+    /// t, a translation and a quaternion of stated order, or a TUM line (x y z qx qy qz qw).
     #[arg(long, value_name = "FILE", required = true)]
     pub(crate) init: Option<PathBuf>,
     /// Unit of the translation of --init: m, mm or cm. If not given: mm for cam_t_m2c, m for all

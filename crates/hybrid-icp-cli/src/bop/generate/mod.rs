@@ -54,10 +54,10 @@ pub(crate) struct Arguments {
     /// sides. `bop sequence` needs such a path.
     #[arg(long)]
     trajectory: bool,
-    /// Move an object in front of the camera, which stands still, at up to 0.3 m/s and 90 degrees/s
-    /// and 30 images per second. A hand passes in front of it; every second sequence of at least
-    /// 5 s has a hand that hides it for 1 to 3 s. The object of scene N is the N-th, and its first
-    /// instance. `bop track` tracks it.
+    /// Move an object in front of the camera, which stands still. The object moves at up to 0.3 m/s
+    /// and 90 degrees/s, in 30 images per second. A hand passes in front of it; every second
+    /// sequence of at least 5 s has a hand that hides it for 1 to 3 s. The object of scene N is the
+    /// N-th, and its first instance. `bop track` tracks it.
     #[arg(long, conflicts_with = "trajectory")]
     moving: bool,
     /// Number of objects per scene. An object may appear several times.

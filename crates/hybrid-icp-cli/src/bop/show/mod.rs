@@ -54,8 +54,8 @@ pub(crate) struct Arguments {
     /// The picture.
     #[arg(long, value_name = "FILE.png")]
     out: PathBuf,
-    /// Show the N estimates of every object that have the best scores; by default as many as it has
-    /// instances in the ground truth, and one without ground truth.
+    /// Show the N estimates of every object that have the best scores. The default is the number of
+    /// its instances in the ground truth, and 1 without ground truth.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), allow_negative_numbers = true)]
     top: Option<u16>,
     /// Read the masks of the MVE from a detections file (JSON with RLE segmentations) instead of
