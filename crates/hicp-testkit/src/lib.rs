@@ -9,8 +9,8 @@
 //! refine poses, use `hybrid-icp`.
 //!
 //! Each function takes a closure that creates a fresh component, to compare fresh instances with
-//! used ones. It also takes the optional laws that this component declares. A call takes well below
-//! a second in a development profile.
+//! used ones. Most also take the optional laws that this component declares. A call lasts well
+//! below a second in a development profile.
 //!
 //! ```
 //! use hicp_testkit::{MetricLaws, check_metric};

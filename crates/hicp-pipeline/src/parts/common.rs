@@ -13,7 +13,7 @@ pub(super) const EDGE: &str = "a steeper surface is a depth edge";
 /// A length whose unit another parameter states.
 const OF_UNIT: Range = Range::positive("of `unit`");
 
-/// Reads a length and the word that says what it is counted in.
+/// Reads a length and its unit, each a parameter.
 pub(super) fn length(
     p: &mut Parameters<'_>,
     name: &'static str,

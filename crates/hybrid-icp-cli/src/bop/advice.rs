@@ -2,7 +2,7 @@
 
 use hybrid_icp::Warning;
 
-/// Returns the files to check for the cause; `poses` says how to check the poses, if any.
+/// Returns the files to check for the cause; `poses` is the advice to check the poses, if any.
 ///
 /// Returns `None` for warnings about models and about single poses, which need no image.
 pub(crate) fn advice(warning: &Warning, poses: Option<&str>) -> Option<String> {
@@ -19,7 +19,7 @@ pub(crate) fn advice(warning: &Warning, poses: Option<&str>) -> Option<String> {
     }
 }
 
-/// Returns whether a warning repeats what `wrong_diameters` says of a model.
+/// Returns whether a warning is about a diameter, which `wrong_diameters` reports, too.
 pub(crate) fn is_about_diameter(warning: &Warning) -> bool {
     matches!(
         warning,

@@ -134,7 +134,7 @@ impl Lines {
 
     /// Reports images that could not be read, and a run that never tracked the object.
     ///
-    /// `advice` says what to check then.
+    /// `advice` names the things to check in that case.
     pub(crate) fn report(&self, output: &Path, advice: &str) -> anyhow::Result<()> {
         let damaged = faults::report(self.faults.iter(), [].iter());
         if self.faults.len() == self.lines.len() {
@@ -156,7 +156,7 @@ impl Lines {
     }
 }
 
-/// Warns that all poses are guesses; `failed` says what happened in none of the images.
+/// Warns that all poses are guesses, because no image had the success that `failed` names.
 pub(crate) fn distrust(output: &Path, failed: &str, images: usize, advice: &str) {
     warn(format_args!(
         "{}: {failed} in none of its {images} images: do not trust its poses, and check {advice}",

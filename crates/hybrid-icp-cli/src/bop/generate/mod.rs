@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=40), allow_negative_numbers = true)]
     instances: u32,
     /// Number of perturbed poses per object that is at least a tenth visible. The n-th of each has
-    /// the score 1/n, so that an evaluation takes the first ones.
+    /// the score 1/n, so that an evaluation uses the first ones.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = count(), allow_negative_numbers = true)]
     starts: u32,
     /// Size of the perturbation in units of the mean errors of a sampling-based estimator (6.2 mm

@@ -19,8 +19,8 @@ type OfScene = (u32, usize, usize, Warning);
 
 /// Returns warnings about flaws in most images of an object in a scene.
 ///
-/// Each scene has its own files. `poses` says how to check the poses, if there are any.
-/// If only a few images have the flaw, their poses are wrong, and the files are right.
+/// Each scene has its own files. `poses` is the advice to check the poses, if there are any. If
+/// only a few images have the flaw, their poses are wrong, and the files are right.
 pub(super) fn about_images(
     results: &[FrameResult],
     rows: &[ResultRow],
