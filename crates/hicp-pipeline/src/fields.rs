@@ -1,4 +1,4 @@
-//! The fields that a file gives to a part, and where they stand.
+//! The fields that a file gives to a part, and their places in the file.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -50,8 +50,9 @@ impl<'a> Fields<'a> {
         fields.find_map(|(key, value)| find(value.get_ref(), key.get_ref(), name))
     }
 
-    /// Returns a field, if it is given, and where it stands. The place of a field that is not given
-    /// is that of its part; that of one that is given is its key, where a person looks.
+    /// Returns a field, if it is given, and its place.
+    ///
+    /// The place of a given field is its key. Otherwise, it is the place of its part.
     pub(crate) fn field(&self, name: &str) -> (Option<&'a DeValue<'a>>, Spot) {
         let given = self.given.and_then(|table| table.get_key_value(name));
         let start = match given {

@@ -10,12 +10,14 @@ const MOST_PIXELS: f64 = 64.0;
 /// Returns the depth image that the camera `to` sees, from the depth image of the camera `from`.
 ///
 /// `to_from_from` is the pose of `from` in the frame of `to`, meters. Use it if the mask belongs to
-/// a color camera with other intrinsics next to the depth camera. Every measured pixel is a small
-/// square in front of `to`; the nearest one counts where several overlap. Pixels that no square
-/// covers are missing, such as where an edge hides the background from the depth camera. A square
-/// that would cover more than 64 pixels along a side, very near to the other camera, is skipped.
+/// a color camera with other intrinsics next to the depth camera.
 ///
-/// Cost: proportional to the pixels of both images.
+/// Every measured pixel is a small square in front of `to`. If several overlap, the nearest one
+/// counts. Pixels that no square covers are missing, such as background that an edge hides from the
+/// depth camera. A square that would cover more than 64 pixels along a side, very near to the other
+/// camera, is skipped.
+///
+/// Cost: proportional to the pixels of both images, and to those that the squares cover.
 #[must_use]
 pub fn register_depth(
     depth: &DepthImage,

@@ -16,7 +16,7 @@ const FORMATS: &str = "PNG, TIFF, BMP, NPY, NPZ or PGM";
 /// The pixels of a mask that belong to the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MaskRule {
-    /// Every value but 0; in a palette image, every color but black and transparent ones.
+    /// Every value but 0. In a PNG or BMP palette, every color but black and transparent ones.
     #[default]
     NotZero,
     /// Every value of at least this number, for probabilities and soft masks.

@@ -1688,8 +1688,8 @@ def read_mask(path: _Path, *, threshold: float | None=None, value: float | None=
     Returns
     -------
     numpy.ndarray, shape (H, W), bool
-        Without `threshold` and `value`: the pixels that are not 0, and in palette images those that
-        are neither black nor transparent.
+        Without `threshold` and `value`: the pixels that are not 0, and with a PNG or BMP palette
+        those that are neither black nor transparent.
 
     Raises
     ------

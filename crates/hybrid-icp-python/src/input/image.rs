@@ -104,8 +104,8 @@ pub(crate) fn read_depth(
 /// Returns
 /// -------
 /// numpy.ndarray, shape (H, W), bool
-///     Without `threshold` and `value`: the pixels that are not 0, and in palette images those that
-///     are neither black nor transparent.
+///     Without `threshold` and `value`: the pixels that are not 0, and with a PNG or BMP palette
+///     those that are neither black nor transparent.
 ///
 /// Raises
 /// ------
