@@ -160,9 +160,12 @@ pub(super) fn add(catalog: &mut Catalog) {
         choice.least_correlation = p.number("least_correlation", FACTOR, correlation, least)?;
         let gain = "gain in correlation that leaves the pose of the stage";
         choice.min_gain = p.number("min_gain", FACTOR, choice.min_gain, gain)?;
-        let stage = p.iterations_of("stage").fold(0, u64::max);
-        let polish = p.iterations_of("polish").fold(0, u64::max);
-        p.takes("polish", stage.saturating_add(polish.saturating_mul(3)))?;
+        // The stage runs again from the chosen pose, and each of two rankings polishes three poses.
+        let runs = [("stage", 2), ("polish", 6)].map(|(name, times)| {
+            let most = p.iterations_of(name).fold(0, u64::max);
+            most.saturating_mul(times)
+        });
+        p.takes("polish", runs[0].saturating_add(runs[1]))?;
         Ok(choice)
     });
     catalog.add_stage("ray-shift", |p| {

@@ -153,18 +153,18 @@ fn limits_are_exact_when_raised_or_lowered() {
     );
 }
 
-/// A hundredth or a tenth of the default limits is enough for every preset.
+/// A fiftieth or a tenth of the default limits is enough for every preset.
 #[test]
 fn presets_are_far_below_the_limits() {
-    let hundredth = PipelineLimits {
-        max_iterations: PipelineLimits::DEFAULT.max_iterations / 100,
-        max_hypotheses: PipelineLimits::DEFAULT.max_hypotheses / 100,
+    let fiftieth = PipelineLimits {
+        max_iterations: PipelineLimits::DEFAULT.max_iterations / 50,
+        max_hypotheses: PipelineLimits::DEFAULT.max_hypotheses / 50,
         max_samples: PipelineLimits::DEFAULT.max_samples / 10,
         max_neighbors: PipelineLimits::DEFAULT.max_neighbors / 10,
     };
     for preset in Preset::ALL {
         let file = PipelineFile::parse(preset.toml(), preset.name()).unwrap();
-        if let Err(error) = file.build_within(&hundredth) {
+        if let Err(error) = file.build_within(&fiftieth) {
             panic!("{error}");
         }
     }
