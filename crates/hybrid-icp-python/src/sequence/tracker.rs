@@ -33,7 +33,8 @@ const MAX_SECONDS: f64 = 10.0;
 /// T_co : array_like, shape (4, 4)
 ///     The rough pose in the first image, camera from object, meters.
 /// meters_per_second : float, optional
-///     Typical speed of the object relative to the camera, m/s.
+///     Typical speed of the object relative to the camera, m/s. An object that leaves the image
+///     faster is rarely found again.
 /// degrees_per_second : float, optional
 ///     Typical angular speed, degrees per second.
 ///
@@ -118,10 +119,12 @@ impl PyTracker {
     /// depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
     ///     In meters, as for `Observation`, in the size of the camera.
     /// seconds : float
-    ///     Time since the previous image, not a time stamp: 0 for an image of the same instant, at
-    ///     most 10. Restart the tracker after a longer pause.
+    ///     Time since the previous image, not a time stamp, also if images in between are missing:
+    ///     0 for an image of the same instant, at most 10. After a longer pause, restart the
+    ///     tracker.
     /// mask : numpy.ndarray, shape (H, W), optional
-    ///     Pixels to which the object is restricted. Not needed.
+    ///     Pixels to which the object is restricted. Not needed. It may be passed for some images
+    ///     only, for example to find a lost object by a segmentation.
     /// scale : float, optional
     ///     Meters per unit of an image of integers.
     ///

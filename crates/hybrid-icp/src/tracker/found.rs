@@ -19,6 +19,10 @@ const LIKELY: f64 = 0.7;
 const EXPECTED: f64 = 0.3;
 /// Noise at which a wrong pose rarely agrees with the image, in diameters.
 const LOW_NOISE: f64 = 0.07;
+/// Smallest share of the pixels of a held object that agree.
+const HELD: f64 = 0.4;
+/// Largest share of them that the camera may see through.
+const SEEN_THROUGH: f64 = 0.1;
 /// Factor by which the noise may exceed that of the images before.
 const MAX_RISE: f64 = 1.1;
 
@@ -118,6 +122,15 @@ impl Found {
         let limit = if expected { 0.45 } else { 0.2 };
         let agrees = self.evidence.agrees > 0.15 && self.contradiction() < limit;
         agrees && (alone || expected)
+    }
+
+    /// Returns whether the image may show the object at the pose, given that it was expected there.
+    ///
+    /// In contrast to [`Found::explains`], a surface that continues the object is no contradiction,
+    /// such as a hand that holds it.
+    pub(super) fn may_be_held(&self) -> bool {
+        let e = &self.evidence;
+        e.agrees > HELD && e.seen_through < SEEN_THROUGH * e.agrees
     }
 
     /// Returns whether most of the object is hidden at the pose.

@@ -45,9 +45,10 @@ const NEAR_DIAMETERS: f64 = 0.4;
 ///
 /// The [`Evidence`] at the pose decides about the state. A hidden pixel is never evidence for a
 /// pose: an object that is hidden entirely is lost after [`TrackerConfig::coast_seconds`]. The
-/// tracker then searches for it among surfaces of about its size, in a region that grows with time.
-/// A pose that was found is [`TrackState::Doubtful`] until the next image confirms it, unless it is
-/// nearly certain. It also stays doubtful while another pose that looks like it is as likely.
+/// tracker then searches for it where it was last seen, and among surfaces of about its size, in a
+/// region that grows with time. A pose that was found is [`TrackState::Doubtful`] until the next
+/// image confirms it, unless it is nearly certain. It also stays doubtful while another pose that
+/// looks like it is as likely.
 ///
 /// Cost of a step while tracking: about that of `hybrid`, including the observation. A step that
 /// searches for the object takes some tens of milliseconds, and rarely up to 0.4 s. Use one tracker
@@ -76,6 +77,8 @@ pub struct Tracker {
     matcher: Matcher,
     config: TrackerConfig,
     motion: Option<Motion>,
+    /// The last pose at which the image showed the object, without those of an unconfirmed trial.
+    last: Isometry3<f64>,
     /// The last pose that a search found, until images have shown the object there for some time.
     trial: Option<Trial>,
     state: TrackState,
@@ -96,6 +99,7 @@ impl Tracker {
             matcher: Matcher::new(model.into(), camera),
             config,
             motion: None,
+            last: Isometry3::identity(),
             trial: None,
             state: TrackState::Lost,
             unseen: 0.0,
@@ -111,6 +115,7 @@ impl Tracker {
         let motion = self.at_rest(camera_from_object, START_RADII);
         self.matcher.forget();
         self.motion = Some(motion).filter(|_| se3::is_finite(camera_from_object));
+        self.last = *camera_from_object;
         self.trial = None;
         self.state = TrackState::Doubtful;
         self.unseen = 0.0;
@@ -127,9 +132,15 @@ impl Tracker {
 
     /// Tracks the object in the next image.
     ///
-    /// `seconds` is the time since the previous image, 0 for one of the same instant. A mask is not
-    /// needed; if there is one, only its pixels are used. Before [`Tracker::start`], the result is
-    /// the identity with the state [`TrackState::Lost`]. Deterministic.
+    /// `seconds` is the time since the previous image, also if images in between are missing. It is
+    /// 0 for an image of the same instant. The object is lost after a sum of these times, so a
+    /// clock that stands still hides a loss.
+    ///
+    /// A mask is not needed; if there is one, only its pixels are used. It may be passed for some
+    /// images only, for example to find a lost object by a segmentation.
+    ///
+    /// Before [`Tracker::start`], the result is the identity with the state [`TrackState::Lost`].
+    /// Deterministic.
     ///
     /// # Errors
     ///
@@ -178,13 +189,24 @@ impl Tracker {
             // Far away, another surface may look like the object.
             found = found.filter(|(found, _)| near || found.is_sure());
         }
-        let counts = |f: &Found| if lost { f.stands_alone() } else { f.explains() };
-        let measured = found.filter(|(found, _)| counts(found));
+        let shown = |f: &Found| f.explains() || f.may_be_held();
+        let counts = |f: &Found| if lost { f.stands_alone() } else { shown(f) };
+        let mut measured = found.filter(|(found, _)| counts(found));
         if let Some(measured) = &measured
             && !motion.update(&measured.0.pose, &measured.1)
         {
             // The evidence is that of the measured pose, so return no other one.
             motion = self.at(measured);
+        }
+        let mut returned = false;
+        if lost && measured.is_none() {
+            // The object may be where it was last seen, for example on a table.
+            let at_rest = self.at_rest(&self.last, START_RADII);
+            measured = self.matcher.follow(depth, mask, &at_rest)?;
+            measured = measured.filter(|(found, _)| found.is_sure());
+            if let Some(measured) = &measured {
+                (motion, found, returned) = (self.at(measured), Some(*measured), true);
+            }
         }
         let found = found.map(|(found, _)| found);
         let mut seen = measured.map(|(found, _)| found);
@@ -219,7 +241,7 @@ impl Tracker {
         let mut searched = false;
         let search = |f: Found| {
             let enough = f.is_clear() && confirmed;
-            !enough && !f.is_hidden() && (doubtful || !f.explains())
+            !enough && !f.is_hidden() && (doubtful || !shown(&f))
         };
         if (lost && seen.is_none()) || found.is_none_or(search) {
             // A pose that was found may be wrong, and does not bound the search.
@@ -244,10 +266,15 @@ impl Tracker {
         } else {
             self.unseen + seconds
         };
+        if let Some(found) = seen.filter(|_| confirmed) {
+            self.last = found.pose;
+        }
         let deviation = motion.deviation(&self.matcher.extent);
         let is_sure = |f: Found| f.is_sure() && deviation < SURE_DIAMETERS * diameter;
         self.state = match seen {
-            Some(found) if is_sure(found) && confirmed && !self.ambiguous => TrackState::Tracking,
+            Some(found) if is_sure(found) && confirmed && !returned && !self.ambiguous => {
+                TrackState::Tracking
+            }
             Some(_) => TrackState::Doubtful,
             None if !lost && self.unseen <= self.config.coast_seconds => TrackState::Doubtful,
             None => TrackState::Lost,

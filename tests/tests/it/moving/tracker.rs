@@ -8,7 +8,7 @@ use hicp_tests::tabletop::Tabletop;
 use hicp_tests::ycbv;
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Translation3, TriMesh,
-    se3,
+    UnitQuaternion, Vector3, se3,
 };
 use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refiner, TrackState, Tracked, Tracker, TrackerConfig};
@@ -279,6 +279,77 @@ fn an_object_among_others_on_a_table_is_followed() {
         let [tracked, doubtful, lost] = standing.states;
         assert!(lost <= most_lost && tracked > 2 * doubtful, "{standing:?}");
         assert_eq!(standing.wrong, 0, "{standing:?}");
+    }
+}
+
+/// A search does not separate it from the table, whose surface it continues.
+#[test]
+fn an_object_on_a_table_is_found_again_where_it_was_hidden() {
+    let tabletop = Tabletop::new(&Household::TUNING).unwrap();
+    let (mut hidden, mut found) = (0, 0);
+    for seen in [0, 4]
+        .into_iter()
+        .flat_map(|seed| tabletop.scene(seed).unwrap())
+    {
+        let model = tabletop.objects[seen.model].1.clone();
+        let near = 0.5 * seen.truth.translation.z as f32;
+        let (width, height) = seen.depth.size();
+        let covered = DepthImage::collect(width, height, seen.depth.pixels().iter().map(|_| near));
+        let covered = Arc::new(covered.unwrap());
+        let mut tracker = Tracker::new(model.clone(), seen.camera, TrackerConfig::default());
+        tracker.start(&seen.truth);
+        let mut steps = |depth: &Arc<DepthImage>, count: usize| {
+            let steps = (0..count).map(|_| tracker.step(Arc::clone(depth), SECONDS, None).unwrap());
+            steps.last().unwrap()
+        };
+        if steps(&seen.depth, 5).state != TrackState::Tracking {
+            continue;
+        }
+        hidden += 1;
+        assert_eq!(steps(&covered, 45).state, TrackState::Lost);
+        let last = steps(&seen.depth, 3);
+        let off = ModelPoints::new(&model).mssd(&last.camera_from_object, &seen.truth);
+        let right = off < 0.1 * model.diameter();
+        found += usize::from(right && last.state == TrackState::Tracking);
+    }
+    assert!(hidden > 5 && found + 1 >= hidden, "{found} of {hidden}");
+}
+
+/// A hand that touches the object continues its surface, and hides a part of it.
+#[test]
+fn an_object_in_a_hand_is_not_lost() {
+    for (object, grip) in [
+        (Household::Bracket, Vector3::new(0.6, 0.1, 0.0)),
+        (Household::Car, Vector3::new(0.3, 0.4, 0.0)),
+    ] {
+        let model = object.model().unwrap();
+        let (center, radius) = (model.center().coords, model.radius());
+        let fist = Household::Carton.model().unwrap();
+        let grip = center + radius * grip - fist.center().coords;
+        let mut tracker = Tracker::new(model.clone(), camera(), TrackerConfig::default());
+        for frame in 0..30 {
+            let time = f64::from(frame) * SECONDS;
+            let rotation = UnitQuaternion::from_euler_angles(0.4, 0.8 * time, 0.5 * time);
+            let truth =
+                Isometry3::from_parts(Translation3::new(0.15 * time - 0.05, 0.0, 0.6), rotation);
+            if frame == 0 {
+                tracker.start(&truth);
+            }
+            let held = hicp_tests::render(&model, &camera(), &truth).0;
+            let hand = truth * Translation3::from(grip);
+            let hand = hicp_tests::render(&fist, &camera(), &hand).0;
+            let nearest = held.pixels().iter().zip(hand.pixels());
+            let nearest = nearest.map(|(a, b)| match (*a > 0.0, *b > 0.0) {
+                (true, true) => a.min(*b),
+                _ => a.max(*b),
+            });
+            let depth = DepthImage::collect(320, 240, nearest).unwrap();
+            let tracked = tracker.step(depth, SECONDS, None).unwrap();
+            let off = ModelPoints::new(&model).mssd(&tracked.camera_from_object, &truth);
+            let place = format!("{} {frame}: {off} m", object.name());
+            assert_ne!(tracked.state, TrackState::Lost, "{place}");
+            assert!(off < 0.1 * model.diameter(), "{place}");
+        }
     }
 }
 
