@@ -34,13 +34,15 @@ pub enum MaskKind {
     Soft,
     /// As [`MaskKind::Soft`], but every pixel above zero is set, as readers of soft masks do.
     SoftAboveZero,
+    /// Displaced at random by this many pixels, differently in areas of six times the size.
+    Ragged(u32),
     /// The bounding box.
     Box,
 }
 
 impl MaskKind {
-    /// The kinds that the tables show.
-    pub const ALL: [Self; 8] = [
+    /// The kinds of the cases to which the confidence is fitted.
+    pub const FITTED: [Self; 8] = [
         Self::Exact,
         Self::Dilated(4),
         Self::Dilated(8),
@@ -48,6 +50,18 @@ impl MaskKind {
         Self::Eroded(4),
         Self::Soft,
         Self::SoftAboveZero,
+        Self::Box,
+    ];
+    /// The kinds that the tables show.
+    pub const ALL: [Self; 9] = [
+        Self::Exact,
+        Self::Dilated(4),
+        Self::Dilated(8),
+        Self::Dilated(16),
+        Self::Eroded(4),
+        Self::Soft,
+        Self::SoftAboveZero,
+        Self::Ragged(4),
         Self::Box,
     ];
 
@@ -59,6 +73,7 @@ impl MaskKind {
             Self::Eroded(pixels) => format!("eroded {pixels} px"),
             Self::Soft => "soft, above a half".into(),
             Self::SoftAboveZero => "soft, above zero".into(),
+            Self::Ragged(pixels) => format!("ragged {pixels} px"),
             Self::Box => "box".into(),
         }
     }
@@ -80,6 +95,7 @@ impl MaskKind {
             Self::Eroded(pixels) => defects.erosion_pixels = pixels,
             Self::Soft => (defects.soft_cells, defects.soft_threshold) = (28, 0.5),
             Self::SoftAboveZero => defects.soft_cells = 28,
+            Self::Ragged(pixels) => defects.ragged_pixels = pixels,
             Self::Box => defects.boxed = true,
         }
         defects

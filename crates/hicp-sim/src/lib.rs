@@ -24,6 +24,7 @@ mod case;
 mod clutter;
 mod corruption;
 mod error;
+mod field;
 mod hand;
 mod mask;
 mod moving;

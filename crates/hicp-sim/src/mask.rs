@@ -5,6 +5,7 @@ use rand::RngExt;
 
 use crate::SimRng;
 use crate::error::{SimError, check_range};
+use crate::field::Field;
 
 /// Defects of a segmentation mask, applied in the order of the fields. The default changes nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,12 +23,16 @@ pub struct MaskDefects {
     pub soft_cells: u32,
     /// The interpolated share above which a pixel of a soft mask is set.
     pub soft_threshold: f64,
+    /// Standard deviation of a smooth displacement of the mask's border, pixels.
+    pub ragged_pixels: u32,
     /// If `true`, the bounding box replaces the mask.
     pub boxed: bool,
 }
 
 /// Largest radius of an erosion or dilation, pixels.
 const MAX_RADIUS: u32 = 256;
+/// Distance over which the displacement of a ragged border changes, per pixel of displacement.
+const AREA_PER_DISPLACEMENT: u32 = 6;
 
 impl MaskDefects {
     /// Returns the mask with these defects. Cost: O(pixels of the mask's box · radius).
@@ -42,6 +47,7 @@ impl MaskDefects {
         for (what, radius) in [
             ("erosion in pixels", self.erosion_pixels),
             ("dilation in pixels", self.dilation_pixels),
+            ("raggedness in pixels", self.ragged_pixels),
         ] {
             check_range(what, f64::from(radius), 0.0..=f64::from(MAX_RADIUS))?;
         }
@@ -59,6 +65,9 @@ impl MaskDefects {
         }
         if self.soft_cells > 0 {
             mask = soften(&mask, self.soft_cells, self.soft_threshold)?;
+        }
+        if self.ragged_pixels > 0 {
+            mask = displace(rng, &mask, self.ragged_pixels)?;
         }
         if self.boxed {
             let region = mask.bounding_region();
@@ -172,6 +181,22 @@ fn soften(mask: &Mask, cells: u32, threshold: f64) -> Result<Mask, SimError> {
         let (a, b) = (x - i as f64, y - j as f64);
         let row = |j| share(i, j) * (1.0 - a) + share(i + 1, j) * a;
         row(j) * (1.0 - b) + row(j + 1) * b > threshold
+    })
+}
+
+/// Displaces every pixel at random, by similar distances in areas of six times `pixels`.
+fn displace(rng: &mut SimRng, mask: &Mask, pixels: u32) -> Result<Mask, SimError> {
+    let (width, height) = (mask.width(), mask.height());
+    let [x, y] = [(); 2].map(|()| Field::draw(rng, AREA_PER_DISPLACEMENT * pixels, width, height));
+    map_mask(mask, |u, v, _| {
+        let moved = |place: u32, field: &Field| {
+            f64::from(place) + (f64::from(pixels) * field.at(u, v)).round()
+        };
+        let (u, v) = (moved(u, &x), moved(v, &y));
+        let inside = (0.0..f64::from(width)).contains(&u) && (0.0..f64::from(height)).contains(&v);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Inside the image.
+        let set = inside && mask.get(u as u32, v as u32) == Some(true);
+        set
     })
 }
 
@@ -343,6 +368,35 @@ mod tests {
         let boxed = boxed.apply(&mut rng(4), &full).unwrap();
         assert_eq!(boxed.bounding_region(), full.bounding_region());
         assert_eq!(count(&boxed), full.bounding_region().area());
+    }
+
+    #[test]
+    fn a_ragged_border_moves_both_ways_by_the_stated_distance() {
+        let full = disc(30.0);
+        let ragged_pixels = 2;
+        let defects = MaskDefects {
+            ragged_pixels,
+            ..MaskDefects::default()
+        };
+        let (mut added, mut removed) = (0.0, 0.0);
+        for seed in 0..20 {
+            let ragged = defects.apply(&mut rng(seed), &full).unwrap();
+            for (u, v) in PixelRegion::of_image(100, 80).pixels() {
+                let (was, is) = (full.get(u, v) == Some(true), ragged.get(u, v) == Some(true));
+                added += f64::from(u8::from(is && !was));
+                removed += f64::from(u8::from(was && !is));
+                let from_border = f64::hypot(f64::from(u) - 50.0, f64::from(v) - 40.0) - 30.0;
+                let far = from_border.abs() > 6.0 * f64::from(ragged_pixels);
+                assert!(was == is || !far, "{u} {v}");
+            }
+        }
+        // The mean of a positive part of a normal variable is σ/√(2π).
+        let area = std::f64::consts::TAU * 30.0 * 20.0;
+        let expected = f64::from(ragged_pixels) / std::f64::consts::TAU.sqrt();
+        for pixels in [added, removed] {
+            let ratio = pixels / area / expected;
+            assert!((ratio - 1.0).abs() < 0.2, "{ratio}");
+        }
     }
 
     #[test]

@@ -256,7 +256,7 @@ fn case(
     (own, model): (&Model, &Model),
     random: &mut SimRng,
 ) -> Result<Case, Box<dyn Error>> {
-    let mask = MaskKind::ALL[random.random_range(0..MaskKind::ALL.len())];
+    let mask = MaskKind::FITTED[random.random_range(0..MaskKind::FITTED.len())];
     let observation = match kind {
         Kind::Wall => seen.walled(random)?.observe(mask)?,
         _ => seen.observe(mask)?,
