@@ -7,7 +7,7 @@ use hicp_core::internal::{VectorLoop, median, whole};
 use hicp_core::{DepthImage, Derived, Observation, PinholeCamera, PixelRegion};
 
 use crate::mve::agreement::all_bits;
-use crate::mve::trust_map::{CERTAIN, TrustMap};
+use crate::mve::trust_map::{CERTAIN, TrustMap, share_of};
 use crate::tolerances::N_TOLERANCES;
 
 /// Number of zeros after each row, for loops over many pixels at once.
@@ -21,6 +21,10 @@ pub(crate) struct CoarseGrid {
     pub(crate) one: u32,
     /// The sum of the weights of measured pixels.
     pub(crate) total: u64,
+    /// The same of masked pixels without a depth, and the share that counts against a pose where it
+    /// does not cover them.
+    unmeasured: u64,
+    uncovered: f32,
     /// The distance behind the rendered surface from which on the camera sees through it; `None`
     /// for an exact mask.
     pub(crate) seen_through_meters: Option<f64>,
@@ -69,6 +73,7 @@ impl CoarseGrid {
                 let weight = |(u, v), _| trust.weight(u, v).into();
                 Self {
                     one: CERTAIN.into(),
+                    uncovered: trust.uncovered(),
                     seen_through_meters: Some(trust.seen_through_meters()),
                     ..Self::new(fine, factor, trust.region(), weight)
                 }
@@ -87,7 +92,7 @@ impl CoarseGrid {
     ) -> Self {
         let camera = fine.camera().scaled_down(factor);
         let region = region.decimated(factor);
-        let mut total = 0;
+        let (mut total, mut unmeasured) = (0, 0);
         let pixel = |(u, v): (u32, u32)| {
             let (u, v) = (u * factor, v * factor);
             let masked = fine.mask().get(u, v) == Some(true);
@@ -100,6 +105,8 @@ impl CoarseGrid {
                     let counts = |place| 2 * weight(place, true) >= certainty;
                     measured = median_around(fine, (u, v), factor, counts);
                 }
+            } else {
+                unmeasured += u64::from(certainty);
             }
             (measured, certainty)
         };
@@ -108,6 +115,8 @@ impl CoarseGrid {
             camera,
             one: 1,
             total,
+            unmeasured,
+            uncovered: 0.0,
             seen_through_meters: None,
             depth: Arc::clone(fine.shared_depth()),
             factor,
@@ -115,6 +124,13 @@ impl CoarseGrid {
             inside,
             rows: (0..camera.height()).map(|_| OnceLock::new()).collect(),
         }
+    }
+
+    /// Returns the weight of the masked pixels without a depth that a pose does not cover.
+    ///
+    /// `covered` is the weight of those that it covers.
+    pub(crate) fn uncovered(&self, covered: u64) -> u64 {
+        share_of(self.uncovered, self.unmeasured - covered)
     }
 
     /// Number of pixels from one row of a buffer to the next.
@@ -198,8 +214,8 @@ const MOST_PIXELS: usize = 1 << 20;
 
 /// The loop that compares the touched pixels of a buffer with a grid, and clears them.
 ///
-/// It returns the weights of pixels that agree, summed over the tolerances, and the weights that
-/// pixels outside the mask lack.
+/// It returns the weights of pixels that agree, summed over the tolerances, the weights that pixels
+/// outside the mask lack, and the weights of masked pixels without a measured depth.
 pub(crate) struct CompareCoarse<'a> {
     pub(crate) grid: &'a CoarseGrid,
     /// The columns and rows that contain the touched pixels.
@@ -214,16 +230,16 @@ pub(crate) struct CompareCoarse<'a> {
 }
 
 impl VectorLoop for CompareCoarse<'_> {
-    type Output = (u64, u64);
+    type Output = [u64; 3];
 
     #[inline(always)]
-    fn run(self) -> (u64, u64) {
+    fn run(self) -> [u64; 3] {
         #[allow(clippy::cast_possible_truncation)] // A small constant.
         let most = N_TOLERANCES as u32;
         let grid = self.grid;
         let [columns, rows] = self.touched;
-        let (mut all_agree, mut all_outside) = (0, 0);
-        let (mut agreement, mut outside) = ([0_u32; LANES], [0_u32; LANES]);
+        let mut all = [0; 3];
+        let mut some = [[0_u32; LANES]; 3];
         let mut pixels = 0;
         for v in rows {
             let row = grid.row(v);
@@ -241,19 +257,20 @@ impl VectorLoop for CompareCoarse<'_> {
                     let known = all_bits(measured[lane] > 0.0);
                     // A pixel agrees within a tolerance if it differs by less.
                     let beyond = whole((behind.abs() * self.per_meter).min(most as f32));
-                    agreement[lane] += touched & known & ((most - beyond) * weight[lane]);
+                    some[0][lane] += touched & known & ((most - beyond) * weight[lane]);
                     let hidden = known & all_bits(behind > self.hidden_beyond);
-                    outside[lane] += touched & !hidden & (grid.one - weight[lane]);
+                    some[1][lane] += touched & !hidden & (grid.one - weight[lane]);
+                    some[2][lane] += touched & !known & weight[lane];
                 }
                 pixels += LANES;
                 if pixels >= MOST_PIXELS {
-                    all_agree += total(&std::mem::take(&mut agreement));
-                    all_outside += total(&std::mem::take(&mut outside));
+                    add(&mut all, &std::mem::take(&mut some));
                     pixels = 0;
                 }
             }
         }
-        (all_agree + total(&agreement), all_outside + total(&outside))
+        add(&mut all, &some);
+        all
     }
 }
 
@@ -266,6 +283,10 @@ fn lanes<T>(numbers: &[T], first: usize) -> &[T; LANES] {
     lanes
 }
 
-fn total(lanes: &[u32; LANES]) -> u64 {
-    lanes.iter().map(|lane| u64::from(*lane)).sum()
+/// Adds sums of lanes to sums.
+#[inline(always)]
+fn add(all: &mut [u64; 3], some: &[[u32; LANES]; 3]) {
+    for (all, lanes) in all.iter_mut().zip(some) {
+        *all += lanes.iter().map(|lane| u64::from(*lane)).sum::<u64>();
+    }
 }

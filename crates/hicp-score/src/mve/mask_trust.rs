@@ -26,6 +26,10 @@ pub enum MaskTrust {
     /// inside a surface that the object touches. If a nearer surface hides it, it does not count.
     /// Otherwise it counts half.
     ///
+    /// Sensors measure nothing along edges, but the mask shows the object there. A masked pixel
+    /// without a measured depth counts half against a pose that does not cover it, if the border of
+    /// the mask is certain.
+    ///
     /// Cost: about that of one more score, once per observation and diameter.
     Imperfect,
 }

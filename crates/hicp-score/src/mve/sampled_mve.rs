@@ -110,7 +110,7 @@ impl SampledMve {
         // The tolerances are multiples of a twentieth of the diameter.
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
         let (per_meter, hidden_beyond) = ((20.0 / diameter) as f32, hidden_beyond as f32);
-        let (agreement, outside) = vectorized(CompareCoarse {
+        let [agreement, outside, covered] = vectorized(CompareCoarse {
             touched,
             buffer: &mut self.buffer,
             grid,
@@ -120,7 +120,8 @@ impl SampledMve {
         if grid.total == 0 {
             return 1.0;
         }
-        let most = N_TOLERANCES as u64 * (grid.total + outside);
+        let union = grid.total + outside + grid.uncovered(covered);
+        let most = N_TOLERANCES as u64 * union;
         (most - agreement) as f64 / most as f64
     }
 }

@@ -25,6 +25,10 @@ const SIDE: usize = 128;
 /// Smallest share of the trust that the removal of a plane must leave.
 const LEAST_KEPT: f32 = 0.15;
 
+/// Share of the weight of a masked pixel without a depth that counts against a pose which does not
+/// cover it, if the border of the mask is certain.
+const UNCOVERED: f32 = 0.5;
+
 /// The weight of a pixel that certainly shows the object.
 pub(crate) const CERTAIN: u8 = 255;
 
@@ -39,6 +43,9 @@ pub(crate) struct TrustMap {
     weights: Vec<u8>,
     /// The sum of the weights of measured pixels.
     total: u64,
+    /// The share of the weight of masked pixels without a depth that counts against a pose where it
+    /// does not cover them.
+    uncovered: f32,
     /// Standard deviation of the depth noise, meters.
     noise: f64,
 }
@@ -141,6 +148,7 @@ impl TrustMap {
             region,
             weights,
             total,
+            uncovered: UNCOVERED * (1.0 - doubt),
             noise,
         }
     }
@@ -158,6 +166,12 @@ impl TrustMap {
     /// Returns the sum of the weights of measured pixels.
     pub(crate) fn total(&self) -> u64 {
         self.total
+    }
+
+    /// Returns the share of the weight of masked pixels without a depth that counts against a pose
+    /// where it does not cover them.
+    pub(crate) fn uncovered(&self) -> f32 {
+        self.uncovered
     }
 
     /// Returns the weight of a pixel.
@@ -191,6 +205,13 @@ impl TrustMap {
             .into_iter()
             .filter(|(columns, _)| !columns.is_empty())
     }
+}
+
+/// Returns a share of a weight.
+pub(crate) fn share_of(share: f32, weight: u64) -> u64 {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // At most the weight.
+    let part = (f64::from(share) * weight as f64) as u64;
+    part
 }
 
 /// Returns the certainty that the border of the mask is that of the object, 0 to 1.

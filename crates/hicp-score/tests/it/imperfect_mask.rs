@@ -165,6 +165,23 @@ fn a_hidden_part_is_no_evidence_but_a_part_in_the_table_is() {
     assert!(inside > hidden + 0.05, "{inside} {hidden}");
 }
 
+/// Sensors measure nothing along edges, so only the mask shows that a smaller object is a wrong one.
+#[test]
+fn a_masked_part_without_depth_is_evidence_against_a_pose_that_leaves_it_out() {
+    let (depth, mask) = scene();
+    let core = grown(&mask, 5, true);
+    let pixels = depth.iter().zip(&core).zip(grown(&mask, 3, false));
+    let without_edges = pixels.map(|((z, core), near)| if near && !core { 0.0 } else { *z });
+    let observation = observe(without_edges.collect(), mask);
+    let small = Model::new(cuboid(0.06, 0.036, 0.095));
+    let of_object = score(MeanVsd::imperfect_mask(), &observation, &at());
+    let of_small = score_of(&small, MeanVsd::imperfect_mask(), &observation, &at());
+    assert!(of_object < 0.06 && of_small > 0.3, "{of_object} {of_small}");
+    let of_object = score(SampledMve::imperfect_mask(), &observation, &at());
+    let of_small = score_of(&small, SampledMve::imperfect_mask(), &observation, &at());
+    assert!(of_small > of_object + 0.1, "{of_object} {of_small}");
+}
+
 #[test]
 fn a_mask_without_depth_explains_nothing() {
     let (depth, mask) = scene();
