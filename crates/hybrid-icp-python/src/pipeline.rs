@@ -354,8 +354,8 @@ impl PyPipeline {
 
     /// Judges a pose as it is, for example a fused one or that of another library.
     ///
-    /// The result has the scores, the confidence and the warnings of a refinement to this pose.
-    /// The call releases the GIL.
+    /// The result has the scores, the confidence and the warnings of `estimate`: nothing is assumed
+    /// about the way in which the pose was found. The call releases the GIL.
     ///
     /// Parameters
     /// ----------

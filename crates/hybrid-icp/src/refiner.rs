@@ -257,8 +257,10 @@ impl<S: Stage> Refiner<S> {
 
     /// Judges a pose as it is, for example a fused one or that of another library.
     ///
-    /// It is its own initial pose. The outcome states that it was kept. Cost: one render,
-    /// the scores of a refinement, and the pairs at the pose.
+    /// Nothing is assumed about the way in which it was found: a pose that looks like it lowers the
+    /// confidence as much as after [`Self::estimate`]. The outcome states that the pose was kept.
+    /// Cost: one render, the scores of a refinement, and the pairs at the pose. If other poses look
+    /// like it, also their renders.
     pub fn judge(
         &mut self,
         model: &Model,
@@ -267,9 +269,8 @@ impl<S: Stage> Refiner<S> {
     ) -> Refinement {
         let problem = Problem::new(model, observation);
         self.workspace.alternatives_mut().clear();
-        let mve = self.mve(model, observation, camera_from_object);
         let outcome = Outcome::kept(camera_from_object, Termination::Kept);
-        self.judged(&problem, Some((camera_from_object, mve)), outcome)
+        self.judged(&problem, None, outcome)
     }
 
     /// Scores the pose of an outcome.
