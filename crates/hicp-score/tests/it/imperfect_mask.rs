@@ -165,7 +165,7 @@ fn a_hidden_part_is_no_evidence_but_a_part_in_the_table_is() {
     assert!(inside > hidden + 0.05, "{inside} {hidden}");
 }
 
-/// Sensors measure nothing along edges, so only the mask shows that a smaller object is a wrong one.
+/// Sensors measure nothing along edges, so only the mask shows that a smaller object is wrong.
 #[test]
 fn a_masked_part_without_depth_is_evidence_against_a_pose_that_leaves_it_out() {
     let (depth, mask) = scene();

@@ -856,8 +856,8 @@ class Pipeline:
     def judge(self, model: Model, observation: Observation, T_co: npt.ArrayLike) -> Result:
         """Judges a pose as it is, for example a fused one or that of another library.
 
-        The result has the scores, the confidence and the warnings of a refinement to this pose.
-        The call releases the GIL.
+        The result has the scores, the confidence and the warnings of `estimate`: nothing is assumed
+        about the way in which the pose was found. The call releases the GIL.
 
         Parameters
         ----------
@@ -1175,7 +1175,8 @@ class Tracker:
     T_co : array_like, shape (4, 4)
         The rough pose in the first image, camera from object, meters.
     meters_per_second : float, optional
-        Typical speed of the object relative to the camera, m/s.
+        Typical speed of the object relative to the camera, m/s. An object that leaves the image
+        faster is rarely found again.
     degrees_per_second : float, optional
         Typical angular speed, degrees per second.
 
@@ -1214,10 +1215,12 @@ class Tracker:
         depth : DepthImage or numpy.ndarray, shape (H, W) or (H, W, 1)
             In meters, as for `Observation`, in the size of the camera.
         seconds : float
-            Time since the previous image, not a time stamp: 0 for an image of the same instant, at
-            most 10. Restart the tracker after a longer pause.
+            Time since the previous image, not a time stamp, also if images in between are missing:
+            0 for an image of the same instant, at most 10. After a longer pause, restart the
+            tracker.
         mask : numpy.ndarray, shape (H, W), optional
-            Pixels to which the object is restricted. Not needed.
+            Pixels to which the object is restricted. Not needed. It may be passed for some images
+            only, for example to find a lost object by a segmentation.
         scale : float, optional
             Meters per unit of an image of integers.
 
