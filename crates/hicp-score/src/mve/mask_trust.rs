@@ -28,7 +28,7 @@ pub enum MaskTrust {
     ///
     /// Sensors measure nothing along edges, but the mask shows the object there. A masked pixel
     /// without a measured depth counts half against a pose that does not cover it, if the border of
-    /// the mask is certain.
+    /// the mask is certain and the mask is not a box.
     ///
     /// Cost: about that of one more score, once per observation and diameter.
     Imperfect,

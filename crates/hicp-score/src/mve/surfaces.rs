@@ -20,7 +20,7 @@ pub(crate) struct Cells<'a> {
 
 impl Cells<'_> {
     /// Returns whether the mask is a rectangle.
-    fn mask_is_box(&self) -> bool {
+    pub(crate) fn mask_is_box(&self) -> bool {
         let rows = self.masked.chunks(self.width);
         let mut rows = rows.filter(|row| row.contains(&true));
         let Some(first) = rows.next() else {

@@ -148,7 +148,12 @@ impl TrustMap {
             region,
             weights,
             total,
-            uncovered: UNCOVERED * (1.0 - doubt),
+            // The corners of a box are background, which may be without depth.
+            uncovered: if grid.mask_is_box() {
+                0.0
+            } else {
+                UNCOVERED * (1.0 - doubt)
+            },
             noise,
         }
     }
