@@ -41,17 +41,6 @@ pub enum MaskKind {
 }
 
 impl MaskKind {
-    /// The kinds of the cases to which the confidence is fitted.
-    pub const FITTED: [Self; 8] = [
-        Self::Exact,
-        Self::Dilated(4),
-        Self::Dilated(8),
-        Self::Dilated(16),
-        Self::Eroded(4),
-        Self::Soft,
-        Self::SoftAboveZero,
-        Self::Box,
-    ];
     /// The kinds that the tables show.
     pub const ALL: [Self; 9] = [
         Self::Exact,
@@ -61,9 +50,14 @@ impl MaskKind {
         Self::Eroded(4),
         Self::Soft,
         Self::SoftAboveZero,
-        Self::Ragged(4),
         Self::Box,
+        Self::Ragged(4),
     ];
+
+    /// Returns the kinds of the cases to which the confidence is fitted: all but the last.
+    pub fn fitted() -> &'static [Self] {
+        &Self::ALL[..8]
+    }
 
     /// Returns the name in tables.
     pub fn name(self) -> String {

@@ -256,7 +256,8 @@ fn case(
     (own, model): (&Model, &Model),
     random: &mut SimRng,
 ) -> Result<Case, Box<dyn Error>> {
-    let mask = MaskKind::FITTED[random.random_range(0..MaskKind::FITTED.len())];
+    let masks = MaskKind::fitted();
+    let mask = masks[random.random_range(0..masks.len())];
     let observation = match kind {
         Kind::Wall => seen.walled(random)?.observe(mask)?,
         _ => seen.observe(mask)?,

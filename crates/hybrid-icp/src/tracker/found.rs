@@ -126,8 +126,8 @@ impl Found {
 
     /// Returns whether the image may show the object at the pose, given that it was expected there.
     ///
-    /// In contrast to [`Found::explains`], a surface that continues the object is no contradiction,
-    /// such as a hand that holds it.
+    /// In contrast to [`Found::explains`], a surface that continues the object, such as a hand that
+    /// holds it, does not contradict the pose.
     pub(super) fn may_be_held(&self) -> bool {
         let e = &self.evidence;
         e.agrees > HELD && e.seen_through < SEEN_THROUGH * e.agrees

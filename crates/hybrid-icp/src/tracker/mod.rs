@@ -77,7 +77,7 @@ pub struct Tracker {
     matcher: Matcher,
     config: TrackerConfig,
     motion: Option<Motion>,
-    /// The last pose at which the image showed the object, without those of an unconfirmed trial.
+    /// The last pose at which the image showed the object, except those of an unconfirmed trial.
     last: Isometry3<f64>,
     /// The last pose that a search found, until images have shown the object there for some time.
     trial: Option<Trial>,
