@@ -9,6 +9,7 @@ use hybrid_icp::{
     Alignment, Diagnosis, Finding, Refinement, SequentialEvent, SequentialStep, StageRecord,
     Tracked,
 };
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -222,7 +223,9 @@ pub(crate) fn tracked<'py>(py: Python<'py>, tracked: &Tracked) -> Record<'py> {
         Tracked {
             T_co: Matrix::from(&tracked.camera_from_object),
             state: tracked.state.name(),
-            agreement: tracked.agreement(),
+            confidence: tracked.confidence,
+            velocity: PyArray1::from_slice(py, tracked.meters_per_second.as_slice()),
+            angular_velocity: PyArray1::from_slice(py, tracked.radians_per_second.as_slice()),
             evidence: BTreeMap::from(tracked.evidence.named()),
             deviation: tracked.deviation_meters,
         }

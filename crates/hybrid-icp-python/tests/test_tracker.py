@@ -13,7 +13,10 @@ def test_a_moving_object_is_tracked_lost_and_found(scene):
     for frame in range(6):
         true = motion @ true if frame else true
         tracked = tracker.step(hi.render_depth(scene.model, scene.camera, true), 1 / 30)
-    assert tracked.state == "tracking" and tracked.agreement > 0.9
+    assert tracked.state == "tracking" and tracked.confidence > 0.9
+    velocity = 30 * (true - np.linalg.inv(motion) @ true)[:3, 3]
+    assert np.linalg.norm(tracked.velocity - velocity) < 0.3 * np.linalg.norm(velocity)
+    assert np.allclose(tracked.angular_velocity, [0.6, 0.3, 0.0], atol=0.2)
     assert hi.add(tracked.T_co, true, scene.model) < 0.003
     assert tracked.evidence["agrees"] > 0.9 and 0 <= tracked.deviation < 0.01
     assert repr(tracked).startswith("Tracked(tracking, t = ")

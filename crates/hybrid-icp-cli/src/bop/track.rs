@@ -20,12 +20,13 @@ use crate::terminal::{counted, progress_bar};
 /// silhouette.
 ///
 /// The output has one line of JSON per image: the pose (cam_R_m2c, cam_t_m2c in mm), the state
-/// (tracking, doubtful or lost), and the evidence. The score is the share of the visible pixels
-/// that agree with the pose (in Python, `agreement`). While an object is lost, its pose is a guess,
-/// around which it is searched. deviation_mm is the standard deviation of the least determined
-/// displacement (in Python, `deviation`, in meters), and time the seconds that the image took.
-/// Use a pose only if its state is tracking. In the result file, the score of a doubtful pose is 0,
-/// and a lost object has no row.
+/// (tracking, doubtful or lost), and the evidence. The score is the confidence: the probability
+/// that the pose is right if no other pose looks like it. While an object is lost, its pose is a
+/// guess, around which it is searched. velocity_mm_per_s is the velocity of the object's center
+/// relative to the camera, and angular_velocity_deg_per_s its rotation, both in the camera frame.
+/// deviation_mm is the standard deviation of the least determined displacement, and time the
+/// seconds that the image took. Use a pose only if its state is tracking. In the result file, the
+/// score of a doubtful pose is 0, and a lost object has no row.
 ///
 /// The exit code is 0 even if the object is lost; the summary counts the states. The pose in an
 /// image whose depth is missing or damaged is predicted. If a file is damaged, or no depth can be
@@ -94,11 +95,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     tracked.report(&follow.output, &follow.advice())
 }
 
-/// Returns the row of a result file. Its score is the agreement, or 0 if the pose is doubtful.
+/// Returns the row of a result file. Its score is the confidence, or 0 if the pose is doubtful.
 fn row(line: &Line, (scene_id, im_id, obj_id): (u32, u32, u32)) -> ResultRow {
     let mut row = ResultRow::new(scene_id, im_id, obj_id, line.tracked.camera_from_object);
     row.score = match line.is_tracking() {
-        true => line.tracked.agreement(),
+        true => line.tracked.confidence,
         false => 0.0,
     };
     row

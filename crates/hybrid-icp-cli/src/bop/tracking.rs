@@ -106,17 +106,18 @@ impl Line {
 
     /// Returns a line of JSON that includes the keys of `image`.
     pub(crate) fn json(&self, image: Value) -> Value {
-        let Tracked {
-            state, evidence, ..
-        } = self.tracked;
-        let shares: BTreeMap<_, _> = evidence.named().into_iter().collect();
+        let tracked = &self.tracked;
+        let shares: BTreeMap<_, _> = tracked.evidence.named().into_iter().collect();
+        let degrees_per_second = tracked.radians_per_second.map(f64::to_degrees);
         let mut line = image;
-        line["state"] = json!(state.name());
-        line["score"] = json!(self.tracked.agreement());
+        line["state"] = json!(tracked.state.name());
+        line["score"] = json!(tracked.confidence);
         line["time"] = json!(self.seconds);
         line["evidence"] = json!(shares);
-        line["deviation_mm"] = json!(1e3 * self.tracked.deviation_meters);
-        add_pose(&mut line, &self.tracked.camera_from_object);
+        line["deviation_mm"] = json!(1e3 * tracked.deviation_meters);
+        line["velocity_mm_per_s"] = json!((1e3 * tracked.meters_per_second).as_slice());
+        line["angular_velocity_deg_per_s"] = json!(degrees_per_second.as_slice());
+        add_pose(&mut line, &tracked.camera_from_object);
         line
     }
 }

@@ -50,6 +50,8 @@ fn images_of_a_folder_are_tracked_as_those_of_a_dataset() {
             "score",
             "evidence",
             "deviation_mm",
+            "velocity_mm_per_s",
+            "angular_velocity_deg_per_s",
         ] {
             assert!(!line[key].is_null());
             assert_eq!(line[key], expected[key], "{image}: {key}");

@@ -547,8 +547,14 @@ class Tracked(_Record):
     state : {"tracking", "doubtful", "lost"}
         "doubtful" if the image does not determine the pose, or does not show the object for some
         frames; "lost" if the pose is a guess.
-    agreement : float
-        Share of the object's visible pixels that agree with the pose, 0 to 1.
+    confidence : float
+        Probability that the pose is right, 0 to 1, by the evidence alone. Other poses that look
+        alike do not lower it, but the state is then "doubtful". 0 if the object is not seen.
+    velocity : numpy.ndarray, shape (3,), float64
+        Velocity of the object's center relative to the camera, m/s, in the camera frame. It is that
+        of the motion filter. While the object is not seen, it decays to 0.
+    angular_velocity : numpy.ndarray, shape (3,), float64
+        Angular velocity of the object relative to the camera, rad/s, in the camera frame.
     evidence : dict of float by name
         Evidence for and against the pose, as in `Result`.
     deviation : float
@@ -557,7 +563,9 @@ class Tracked(_Record):
 
     T_co: _Array
     state: Literal["tracking", "doubtful", "lost"]
-    agreement: float
+    confidence: float
+    velocity: _Array
+    angular_velocity: _Array
     evidence: dict[str, float]
     deviation: float
 

@@ -37,7 +37,7 @@ pub(super) struct Found {
     pub(super) mve: f64,
     pub(super) evidence: Evidence,
     /// The probability that the pose is right, by the evidence alone.
-    confidence: f64,
+    pub(super) confidence: f64,
     /// Standard deviation of the depth noise that the evidence is judged by, in diameters.
     noise: f64,
 }

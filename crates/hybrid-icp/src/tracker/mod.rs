@@ -12,7 +12,7 @@ mod tracked;
 use std::sync::Arc;
 
 use hicp_core::internal::check_size;
-use hicp_core::{DepthImage, Isometry3, Mask, Matrix6, Model, PinholeCamera, se3};
+use hicp_core::{DepthImage, Isometry3, Mask, Matrix6, Model, PinholeCamera, Vector3, se3};
 use hicp_score::Evidence;
 
 use self::finder::{CERTAIN, CLEARLY};
@@ -173,6 +173,9 @@ impl Tracker {
             return Ok(Tracked {
                 camera_from_object: Isometry3::identity(),
                 state: TrackState::Lost,
+                confidence: 0.0,
+                meters_per_second: Vector3::zeros(),
+                radians_per_second: Vector3::zeros(),
                 evidence: Evidence::default(),
                 deviation_meters: f64::INFINITY,
             });
@@ -293,9 +296,13 @@ impl Tracker {
             _ => {}
         }
         self.motion = Some(motion);
+        let velocity = motion.velocity();
         Ok(Tracked {
             camera_from_object: *motion.pose(),
             state: self.state,
+            confidence: seen.map_or(0.0, |found| found.confidence),
+            meters_per_second: velocity.fixed_rows::<3>(0).into_owned(),
+            radians_per_second: velocity.fixed_rows::<3>(3).into_owned(),
             evidence: seen.or(found).map(|f| f.evidence).unwrap_or_default(),
             deviation_meters: motion.deviation(&self.matcher.extent),
         })

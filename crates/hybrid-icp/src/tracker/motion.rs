@@ -68,6 +68,11 @@ impl Motion {
         &self.pose
     }
 
+    /// Returns the velocity of the center and the angular velocity, m/s and rad/s.
+    pub(super) fn velocity(&self) -> &Vector6<f64> {
+        &self.velocity
+    }
+
     /// Returns the center of the object in the camera frame, meters.
     pub(super) fn center(&self) -> Point3<f64> {
         self.pose * self.center

@@ -1,6 +1,6 @@
 //! The parameters and the results of a tracker.
 
-use hicp_core::{ImageError, Isometry3};
+use hicp_core::{ImageError, Isometry3, Vector3};
 use hicp_score::Evidence;
 use thiserror::Error;
 
@@ -79,6 +79,18 @@ pub struct Tracked {
     pub camera_from_object: Isometry3<f64>,
     /// The degree of trust in the pose.
     pub state: TrackState,
+    /// The probability that the pose is right, 0 to 1, by the evidence alone
+    /// ([`Confidence`](hicp_score::Confidence)).
+    ///
+    /// Other poses that look alike do not lower it, but the state is then
+    /// [`TrackState::Doubtful`]. It is 0 if the object is not seen.
+    pub confidence: f64,
+    /// The velocity of the object's center relative to the camera, m/s, in the camera frame.
+    ///
+    /// It is that of the motion filter. While the object is not seen, it decays to 0.
+    pub meters_per_second: Vector3<f64>,
+    /// The angular velocity of the object relative to the camera, rad/s, in the camera frame.
+    pub radians_per_second: Vector3<f64>,
     /// The evidence for and against the pose.
     ///
     /// It is measured at the registered pose. The filter moves that by at most four standard
@@ -90,19 +102,4 @@ pub struct Tracked {
     /// axes of symmetry do not count. It comes from the motion and the registration, without errors
     /// of the model.
     pub deviation_meters: f64,
-}
-
-impl Tracked {
-    /// Returns the share of the object's visible pixels that agree with the pose, 0 to 1.
-    ///
-    /// Hidden and unmeasured pixels do not count. Without visible pixels it is 0.
-    #[must_use]
-    pub fn agreement(&self) -> f64 {
-        let (agrees, contradicts) = (self.evidence.agrees, self.evidence.contradicts());
-        if agrees > 0.0 {
-            agrees / (agrees + contradicts)
-        } else {
-            0.0
-        }
-    }
 }

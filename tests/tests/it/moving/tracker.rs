@@ -8,7 +8,7 @@ use hicp_tests::tabletop::Tabletop;
 use hicp_tests::ycbv;
 use hybrid_icp::core::{
     DepthImage, Isometry3, Mask, Model, Observation, PinholeCamera, Point3, Translation3, TriMesh,
-    UnitQuaternion, Vector3, se3,
+    UnitQuaternion, Vector3, se3, so3,
 };
 use hybrid_icp::score::ModelPoints;
 use hybrid_icp::{Preset, Refiner, TrackState, Tracked, Tracker, TrackerConfig};
@@ -81,6 +81,14 @@ fn a_moving_object_is_tracked_without_masks() {
     let center = sequence.model.center();
     let moved = (poses[39] * center - poses[0] * center).norm();
     assert!(moved > 0.04, "{moved}");
+    for frame in 10..39 {
+        let [before, now] = [poses[frame - 1], poses[frame]];
+        let away = (now * center - before * center) / SECONDS - tracked[frame].meters_per_second;
+        let turn = so3::log(&(now.rotation * before.rotation.inverse())) / SECONDS;
+        let angle = (turn - tracked[frame].radians_per_second).norm();
+        assert!(away.norm() < 0.1 && angle < 0.5, "{frame}: {away} {angle}");
+        assert!(tracked[frame].confidence > 0.7, "{frame}");
+    }
     assert_eq!(tracked, sequence.track());
 }
 
@@ -220,6 +228,7 @@ fn images_without_the_object_and_starts_that_are_not_finite_are_never_tracked() 
                     let tracked = tracker.step(Arc::clone(depth), seconds, mask).unwrap();
                     assert_ne!(tracked.state, TrackState::Tracking, "{start:?} {value}");
                     assert!(se3::is_finite(&tracked.camera_from_object));
+                    assert!(tracked.meters_per_second.norm().is_finite());
                 }
             }
         }
