@@ -23,6 +23,9 @@ def test_a_moving_object_is_tracked_lost_and_found(scene):
     nothing = np.zeros((240, 320), np.float32)
     states = [tracker.step(nothing, 1 / 30).state for _ in range(6)]
     assert "tracking" not in states and states[-1] == "lost"
+    patient = hi.Tracker(scene.model, scene.camera, true, coast_seconds=1.0)
+    states = [patient.step(nothing, 1 / 30).state for _ in range(6)]
+    assert states == 6 * ["doubtful"]
     tracker.restart(true)
     depth = hi.DepthImage(hi.render_depth(scene.model, scene.camera, true))
     assert tracker.step(depth, 1 / 30).state == "tracking"
@@ -48,10 +51,12 @@ def test_images_of_another_size_are_refused(scene):
 
 
 def test_implausible_arguments_are_refused_or_cause_a_warning(scene):
-    with pytest.raises(hi.InputError, match="meters_per_second is -1, expected a finite speed"):
+    with pytest.raises(hi.InputError, match="meters_per_second is -1, expected a finite number"):
         hi.Tracker(scene.model, scene.camera, scene.true, meters_per_second=-1)
-    with pytest.raises(hi.InputError, match="degrees_per_second is NaN, expected a finite speed"):
+    with pytest.raises(hi.InputError, match="degrees_per_second is NaN, expected a finite number"):
         hi.Tracker(scene.model, scene.camera, scene.true, degrees_per_second=np.nan)
+    with pytest.raises(hi.InputError, match="coast_seconds is -1, expected a finite number"):
+        hi.Tracker(scene.model, scene.camera, scene.true, coast_seconds=-1)
     with pytest.warns(hi.InputWarning, match="behind the camera, .* not object from camera"):
         hi.Tracker(scene.model, scene.camera, np.linalg.inv(scene.true))
     tracker = hi.Tracker(scene.model, scene.camera, scene.true)

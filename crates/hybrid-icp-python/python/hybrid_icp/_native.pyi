@@ -1179,6 +1179,10 @@ class Tracker:
         faster is rarely found again.
     degrees_per_second : float, optional
         Typical angular speed, degrees per second.
+    memory_seconds : float, optional
+        The time in which the object changes its velocity, seconds.
+    coast_seconds : float, optional
+        The time for which an object that is not seen stays "doubtful" before it is "lost", seconds.
 
     Warns
     -----
@@ -1204,7 +1208,7 @@ class Tracker:
     True
     """
 
-    def __new__(cls, model: Model, camera: Camera, T_co: npt.ArrayLike, *, meters_per_second: float=0.3, degrees_per_second: float=90.0) -> Tracker:
+    def __new__(cls, model: Model, camera: Camera, T_co: npt.ArrayLike, *, meters_per_second: float=0.3, degrees_per_second: float=90.0, memory_seconds: float=0.5, coast_seconds: float=0.1) -> Tracker:
         ...
 
     def step(self, depth: DepthImage | _Depth, seconds: float, mask: _Mask | None=None, *, scale: float | None=None) -> Tracked:

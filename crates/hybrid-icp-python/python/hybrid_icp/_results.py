@@ -551,10 +551,11 @@ class Tracked(_Record):
         Probability that the pose is right, 0 to 1, by the evidence alone. Other poses that look
         alike do not lower it, but the state is then "doubtful". 0 if the object is not seen.
     velocity : numpy.ndarray, shape (3,), float64
-        Velocity of the object's center relative to the camera, m/s, in the camera frame. It is that
-        of the motion filter. While the object is not seen, it decays to 0.
+        Velocity of the object's center relative to the camera, meters per second, in the camera
+        frame. It is that of the motion filter. While the object is not seen, it decays to 0.
     angular_velocity : numpy.ndarray, shape (3,), float64
-        Angular velocity of the object relative to the camera, rad/s, in the camera frame.
+        Angular velocity of the object relative to the camera, radians per second, in the camera
+        frame.
     evidence : dict of float by name
         Evidence for and against the pose, as in `Result`.
     deviation : float

@@ -37,6 +37,10 @@ const MAX_SECONDS: f64 = 10.0;
 ///     faster is rarely found again.
 /// degrees_per_second : float, optional
 ///     Typical angular speed, degrees per second.
+/// memory_seconds : float, optional
+///     The time in which the object changes its velocity, seconds.
+/// coast_seconds : float, optional
+///     The time for which an object that is not seen stays "doubtful" before it is "lost", seconds.
 ///
 /// Warns
 /// -----
@@ -77,27 +81,32 @@ struct Tracking {
 #[allow(non_snake_case)]
 impl PyTracker {
     #[new]
-    #[pyo3(signature = (model, camera, T_co, *, meters_per_second = 0.3, degrees_per_second = 90.0))]
+    #[pyo3(signature = (model, camera, T_co, *, meters_per_second = 0.3, degrees_per_second = 90.0, memory_seconds = 0.5, coast_seconds = 0.1))]
     fn new(
         model: &Bound<'_, PyModel>,
         camera: &Bound<'_, PyCamera>,
         T_co: &Bound<'_, PyAny>,
         meters_per_second: f64,
         degrees_per_second: f64,
+        memory_seconds: f64,
+        coast_seconds: f64,
     ) -> PyResult<Self> {
-        for (name, speed) in [
+        for (name, number) in [
             ("meters_per_second", meters_per_second),
             ("degrees_per_second", degrees_per_second),
+            ("memory_seconds", memory_seconds),
+            ("coast_seconds", coast_seconds),
         ] {
-            if !(speed.is_finite() && speed >= 0.0) {
-                let text = format!("{name} is {speed}, expected a finite speed, 0 or more");
+            if !(number.is_finite() && number >= 0.0) {
+                let text = format!("{name} is {number}, expected a finite number, 0 or more");
                 return Err(InputError::new_err(text));
             }
         }
         let config = TrackerConfig {
             meters_per_second,
             degrees_per_second,
-            ..TrackerConfig::default()
+            memory_seconds,
+            coast_seconds,
         };
         let tracker = Tracker::new(model.get().model.clone(), camera.get().0, config);
         let this = Self {
