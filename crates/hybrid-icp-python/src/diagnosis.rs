@@ -57,7 +57,7 @@ use crate::warnings;
 /// >>> observation = Observation(10 * depth, depth > 0, camera)
 /// >>> rough = np.eye(4); rough[2, 3] = 0.503
 /// >>> diagnosis = diagnose(model, observation, rough)
-/// >>> diagnosis.faults[0]["problem"], diagnosis.faults[0]["fix"]
+/// >>> diagnosis.faults[0].problem, diagnosis.faults[0].fix
 /// ('the depth is 10 times too large', 'multiply the depth by 0.1')
 #[pyfunction]
 #[allow(non_snake_case)]

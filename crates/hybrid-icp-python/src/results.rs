@@ -112,15 +112,18 @@ fn stage<'py>(py: Python<'py>, record: &StageRecord) -> Record<'py> {
     )
 }
 
-fn alternative<'py>(py: Python<'py>, other: &Alternative) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    dict.set_item("T_co", Matrix::from(&other.camera_from_object))?;
-    dict.set_item("score", other.score)?;
-    dict.set_item("gap", other.gap)?;
-    dict.set_item("color_gap", other.color_gap)?;
-    dict.set_item("mssd", other.mssd_meters)?;
-    dict.set_item("rotation_degrees", other.rotation_degrees)?;
-    Ok(dict)
+fn alternative<'py>(py: Python<'py>, other: &Alternative) -> Record<'py> {
+    record!(
+        py,
+        Alternative {
+            T_co: Matrix::from(&other.camera_from_object),
+            score: other.score,
+            gap: other.gap,
+            color_gap: other.color_gap,
+            mssd: other.mssd_meters,
+            rotation_degrees: other.rotation_degrees,
+        }
+    )
 }
 
 /// Creates the result of a refinement of `model` from the pose `init`.

@@ -179,9 +179,9 @@ def test_colors_tell_the_sides_of_a_square_apart_and_return_their_margin():
     colored = hi.Observation(depth, seen, camera, color=picture[row, column])
     result = pipeline.refine(model, colored, rough)
     assert np.allclose(result.T_co[:3, :3], np.eye(3), atol=0.02)
-    [margin] = [a["color_gap"] for a in result.alternatives if np.allclose(a["T_co"], rough)]
+    [margin] = [a.color_gap for a in result.alternatives if np.allclose(a.T_co, rough)]
     assert 0.15 < margin <= 2 and not any("ambiguous" in text for text in result.warnings)
-    assert result.to_dict()["alternatives"][0]["color_gap"] == result.alternatives[0]["color_gap"]
+    assert result.to_dict()["alternatives"][0]["color_gap"] == result.alternatives[0].color_gap
 
     # The far square, seen from behind, shows the mirrored picture.
     mirrored = hi.Observation(depth, seen, camera, color=picture[63 - row, column])
@@ -194,7 +194,7 @@ def test_colors_tell_the_sides_of_a_square_apart_and_return_their_margin():
     for observation in (other, hi.Observation(depth, seen, camera)):
         result = pipeline.refine(model, observation, rough)
         assert np.array_equal(result.T_co, rough) and result.alternatives
-        assert all(other["color_gap"] is None for other in result.alternatives)
+        assert all(other.color_gap is None for other in result.alternatives)
 
 
 def test_colors_that_are_missing_cause_a_warning():

@@ -23,15 +23,16 @@ def test_a_fault_is_named_with_its_fix_and_numbers(scene):
         hi.Pipeline().refine(scene.model, scene.observation, millimeters)
     diagnosis = hi.diagnose(scene.model, scene.observation, millimeters)
     first = diagnosis.faults[0]
-    assert first["fault"] == "translation_scale" and first["numbers"] == {"factor": 0.001}
-    assert first["fix"] == "multiply the translation of the pose by 0.001"
-    assert first["score"] < 0.2 < diagnosis.score
-    assert str(diagnosis).splitlines()[1] == f"  fix: {first['fix']}"
-    assert json.loads(json.dumps(diagnosis.to_dict()))["faults"] == diagnosis.faults
+    assert first.fault == "translation_scale" and first.numbers == {"factor": 0.001}
+    assert first.fix == "multiply the translation of the pose by 0.001"
+    assert first.score < 0.2 < diagnosis.score
+    assert str(diagnosis).splitlines()[1] == f"  fix: {first.fix}"
+    assert json.loads(json.dumps(diagnosis.to_dict()))["faults"][0] == first.to_dict()
+    assert repr(first) == "Fault(translation_scale, {'factor': 0.001})"
     assert repr(diagnosis).startswith("Diagnosis(['translation_scale'")
 
 
 def test_a_fact_has_no_score(scene):
     empty = hi.Observation(scene.observation.image, np.zeros((240, 320), bool), scene.camera)
     diagnosis = hi.diagnose(scene.model, empty, scene.rough)
-    assert [(fault["fault"], fault["score"]) for fault in diagnosis.faults] == [("mask_empty", None)]
+    assert [(fault.fault, fault.score) for fault in diagnosis.faults] == [("mask_empty", None)]

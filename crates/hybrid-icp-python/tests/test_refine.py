@@ -87,11 +87,12 @@ def test_other_poses_of_a_search_come_with_their_scores(scene):
     pipeline = hi.Pipeline("search", overrides={"start": "ignored", "good_enough": 0})
     result = pipeline.refine(scene.model, scene.observation, scene.rough)
     assert result.alternatives
-    scores = [other["score"] for other in result.alternatives]
+    scores = [other.score for other in result.alternatives]
     assert scores == sorted(scores)
     for other in result.alternatives:
-        assert other["T_co"].shape == (4, 4) and other["gap"] <= other["score"]
-        assert other["mssd"] > 0 and other["rotation_degrees"] > 0
+        assert other.T_co.shape == (4, 4) and other.gap <= other.score
+        assert other.mssd > 0 and other.rotation_degrees > 0
+        assert repr(other).startswith("Alternative(") and not other.T_co.flags.writeable
     [again] = pipeline.refine_batch(scene.model, scene.observation, [scene.rough])
     assert again.to_dict()["alternatives"] == result.to_dict()["alternatives"]
     local = hi.Pipeline.preset("local").refine(scene.model, scene.observation, scene.rough)

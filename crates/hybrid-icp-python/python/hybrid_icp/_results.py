@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypedDict
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,26 +15,6 @@ if TYPE_CHECKING:
 
 _Array = npt.NDArray[np.float64]
 _Outcome = Literal["refined", "kept_initial"]
-
-
-class Alternative(TypedDict):
-    """Another pose that a search found.
-
-    - `T_co`: the pose, camera from object, shape (4, 4), float64, meters.
-    - `score`: the score of the search; lower is better.
-    - `gap`: the score minus that of the returned pose.
-    - `color_gap`: the agreement of the colors at the returned pose minus that at this one, as
-      correlations; None if there are no colors, or if they do not distinguish the poses.
-    - `mssd`: distance from the returned pose, meters.
-    - `rotation_degrees`: angle to the returned pose.
-    """
-
-    T_co: _Array
-    score: float
-    gap: float
-    color_gap: float | None
-    mssd: float
-    rotation_degrees: float
 
 
 def _plain(value: Any) -> Any:
@@ -47,7 +27,7 @@ def _plain(value: Any) -> Any:
         return [_plain(item) for item in value]
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
-    return value.to_dict() if isinstance(value, StageEvent) else value
+    return value.to_dict() if isinstance(value, _Record) else value
 
 
 class _Record:
@@ -207,6 +187,39 @@ class StageEvent(_Record):
         parts = f"{self.selection}, {self.association}, {self.metric}"
         numbers = f"{self.iterations} iterations, {self.n_pairs} pairs"
         return f"StageEvent({parts}: {numbers}, {self.termination})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Alternative(_Record):
+    """Another pose that a search found.
+
+    Attributes
+    ----------
+    T_co : numpy.ndarray, shape (4, 4), float64
+        The pose, camera from object, meters.
+    score : float
+        The score of the search; lower is better.
+    gap : float
+        The score minus that of the returned pose.
+    color_gap : float or None
+        The agreement of the colors at the returned pose minus that at this one, as correlations;
+        None if there are no colors, or if they do not distinguish the poses.
+    mssd : float
+        Distance from the returned pose, meters.
+    rotation_degrees : float
+        Angle to the returned pose.
+    """
+
+    T_co: _Array
+    score: float
+    gap: float
+    color_gap: float | None
+    mssd: float
+    rotation_degrees: float
+
+    def __repr__(self) -> str:
+        away = f"{1000 * self.mssd:.1f} mm, {self.rotation_degrees:.0f}° away"
+        return f"Alternative({away}, gap {self.gap:.3f})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -443,14 +456,23 @@ class Alignment(_Record):
         return f"Alignment({self.outcome}, {self.termination}, fitness {self.fitness:.3f})"
 
 
-class Fault(TypedDict):
+@dataclass(frozen=True, eq=False, repr=False)
+class Fault(_Record):
     """A fault of the inputs of a refinement, and the evidence for it.
 
-    - `fault`: its name, such as "mesh_scale".
-    - `problem`, `fix`: the fault and the correction in words.
-    - `score`: the score of the corrected inputs, to compare with that of the `Diagnosis`; None if
-      the fault is a fact that needs no comparison.
-    - `numbers`: the numbers of the fault by name, such as {"factor": 0.001}.
+    Attributes
+    ----------
+    fault : str
+        Its name, such as "mesh_scale".
+    problem : str
+        The fault in words.
+    fix : str
+        The correction in words.
+    score : float or None
+        The score of the corrected inputs, to compare with that of the `Diagnosis`; None if the
+        fault is a fact that needs no comparison.
+    numbers : dict
+        The numbers of the fault by name, such as {"factor": 0.001}.
     """
 
     fault: str
@@ -458,6 +480,9 @@ class Fault(TypedDict):
     fix: str
     score: float | None
     numbers: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"Fault({self.fault}, {self.numbers})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -488,13 +513,13 @@ class Diagnosis(_Record):
             return f"no fault found (score {self.score:.3f}): {judged}"
         ranks = ["fault"] + ["less probable"] * (len(self.faults) - 1)
         lines = (
-            f"{rank}: {fault['problem']}\n  fix: {fault['fix']}"
+            f"{rank}: {fault.problem}\n  fix: {fault.fix}"
             for rank, fault in zip(ranks, self.faults)
         )
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        return f"Diagnosis({[fault['fault'] for fault in self.faults]}, score {self.score:.3f})"
+        return f"Diagnosis({[fault.fault for fault in self.faults]}, score {self.score:.3f})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
