@@ -573,8 +573,9 @@ class Tracked(_Record):
         "doubtful" if the image does not determine the pose, or does not show the object for some
         frames; "lost" if the pose is a guess.
     confidence : float
-        Probability that the pose is right, 0 to 1, by the evidence alone. Other poses that look
-        alike do not lower it, but the state is then "doubtful". 0 if the object is not seen.
+        Probability that the pose is right, 0 to 1, by the evidence alone. Poses that look alike do
+        not lower it: the motion tells them apart, or the state is "doubtful". 0 if the object is
+        not seen.
     velocity : numpy.ndarray, shape (3,), float64
         Velocity of the object's center relative to the camera, meters per second, in the camera
         frame. It is that of the motion filter. While the object is not seen, it decays to 0.

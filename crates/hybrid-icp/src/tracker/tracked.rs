@@ -82,7 +82,7 @@ pub struct Tracked {
     /// The probability that the pose is right, 0 to 1, by the evidence alone
     /// ([`Confidence`](hicp_score::Confidence)).
     ///
-    /// Other poses that look alike do not lower it, but the state is then
+    /// Poses that look alike do not lower it. The motion tells them apart, or the state is
     /// [`TrackState::Doubtful`]. It is 0 if the object is not seen.
     pub confidence: f64,
     /// The velocity of the object's center relative to the camera, m/s, in the camera frame.
