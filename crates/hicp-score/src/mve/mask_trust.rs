@@ -30,6 +30,12 @@ pub enum MaskTrust {
     /// without a measured depth counts half against a pose that does not cover it, if the border of
     /// the mask is certain and the mask is not a box.
     ///
+    /// Some masks are cut to the pixels with a depth, so that the object is larger than its mask.
+    /// If most pixels along the outside of the border have no depth, and most along its inside have
+    /// one, pixels without a depth up to 10 pixels outside the mask do not count. If most pixels
+    /// farther around have no depth, either, this rule does not apply: the background may be too
+    /// far away to be measured.
+    ///
     /// Cost: about that of one more score, once per observation and diameter.
     Imperfect,
 }

@@ -8,7 +8,7 @@ use crate::judgment::insides::inside_share;
 use crate::mve::agreement::{Agreement, Found, Row, Weights};
 use crate::mve::mask_trust::MaskTrust;
 use crate::mve::occlusion::Occlusion;
-use crate::mve::trust_map::{CERTAIN, TrustMap, share_of};
+use crate::mve::trust_map::{TrustMap, share_of};
 use crate::score::Score;
 use crate::tolerances::{N_TOLERANCES, errors, mean};
 
@@ -171,9 +171,7 @@ impl Compared<'_> {
         };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A share of a count.
         let inside = (found.nearer as f64 * share) as u64;
-        let (mask, n_measured) = (self.observation.mask(), self.observation.n_measured());
-        let unmeasured = u64::from(CERTAIN) * (mask.n_set() - n_measured) as u64;
-        let uncovered = share_of(trust.uncovered(), unmeasured - found.unmeasured);
+        let uncovered = share_of(trust.uncovered(), trust.unmeasured() - found.unmeasured);
         errors(
             found.correct,
             trust.total() + found.outside + inside + uncovered,

@@ -1,6 +1,7 @@
 //! The mean VSD estimate: a score of a pose against the live image.
 
 pub(crate) mod agreement;
+pub(crate) mod cells;
 pub(crate) mod coarse_grid;
 pub(crate) mod distances;
 pub(crate) mod mask_trust;

@@ -2,48 +2,14 @@
 
 use hicp_core::internal::DisjointSets;
 
+use crate::mve::cells::Cells;
+
 /// Share of its contact with the border of the mask over which another object continues.
 const CONTINUES: f32 = 0.5;
 /// Smallest share of the cells that the other surfaces must have.
 const LEAST_KEPT: f32 = 0.15;
 /// Smallest share of these that a surface needs to gain trust.
 const LEAST_SURFACE: f32 = 0.1;
-
-/// The cells of a mask and its surroundings, row by row.
-pub(crate) struct Cells<'a> {
-    /// Number of columns, at least 1.
-    pub(crate) width: usize,
-    pub(crate) masked: &'a [bool],
-    /// Measured depth, meters.
-    pub(crate) depths: &'a [f32],
-}
-
-impl Cells<'_> {
-    /// Returns whether the mask is a rectangle.
-    pub(crate) fn mask_is_box(&self) -> bool {
-        let rows = self.masked.chunks(self.width);
-        let mut rows = rows.filter(|row| row.contains(&true));
-        let Some(first) = rows.next() else {
-            return false;
-        };
-        let mut after = first.iter().skip_while(|on| !**on).skip_while(|on| **on);
-        after.all(|on| !on) && rows.all(|row| row == first)
-    }
-
-    /// Calls a function with the pairs of neighbors, each once.
-    #[inline(always)]
-    pub(crate) fn for_pairs(&self, mut call: impl FnMut(usize, usize)) {
-        let (width, cells) = (self.width, self.masked.len());
-        for first in (0..cells).step_by(width) {
-            for cell in first..first + width - 1 {
-                call(cell, cell + 1);
-            }
-        }
-        for cell in width..cells {
-            call(cell - width, cell);
-        }
-    }
-}
 
 /// The number of cells of a surface, of its contacts with the border of the mask, and of those over
 /// which it continues.
@@ -70,7 +36,7 @@ impl Surface {
 /// Cost: O(cells).
 pub(crate) fn trust_surfaces(
     trust: &mut [f32],
-    cells: &Cells<'_>,
+    cells: &Cells,
     stands_out: impl Fn(usize) -> f32,
     step: f32,
 ) {
@@ -141,8 +107,9 @@ mod tests {
         masked[8 * WIDTH - 2] = boxed;
         let cells = Cells {
             width: WIDTH,
-            masked: &masked,
-            depths: &depths,
+            step: 1,
+            masked,
+            depths: depths.clone(),
         };
         let mut trust = vec![0.5; depths.len()];
         let stands_out = |cell: usize| f32::from(u8::from(depths[cell] != f32::from(b'.')));

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use hicp_core::internal::{Surroundings, median};
 use hicp_core::{Observation, PinholeCamera, PixelRegion};
 
+use crate::mve::cells::{Cells, rows};
 use crate::mve::distances::to_border;
 use crate::mve::occlusion::VISIBILITY_TOLERANCE_METERS;
-use crate::mve::surfaces::{Cells, trust_surfaces};
+use crate::mve::surfaces::trust_surfaces;
 
 /// Width of the uncertain border, as a share of the square root of the mask's area.
 const BORDER: f32 = 0.25;
@@ -19,15 +20,16 @@ const BEYOND_PIXELS: f32 = 4.0;
 /// Smallest step of depth at the border of an object, meters.
 const STEP_METERS: f64 = 0.01;
 
-/// Number of cells along the longer side of the grid on which weights are computed.
-const SIDE: usize = 128;
-
 /// Smallest share of the trust that the removal of a plane must leave.
 const LEAST_KEPT: f32 = 0.15;
 
 /// Share of the weight of a masked pixel without a depth that counts against a pose which does not
 /// cover it, if the border of the mask is certain.
 const UNCOVERED: f32 = 0.5;
+
+/// Distance from a mask that was cut to measured pixels within which pixels without a depth do not
+/// count.
+const CUT_PIXELS: f32 = 10.0;
 
 /// The weight of a pixel that certainly shows the object.
 pub(crate) const CERTAIN: u8 = 255;
@@ -39,10 +41,11 @@ pub(crate) struct TrustMap {
     /// The weights of the pixels of the region, row by row.
     ///
     /// Masked pixels without a measured depth have the full weight, so that they do not count
-    /// against a pose.
+    /// against a pose. So do those near a mask that was cut to measured pixels.
     weights: Vec<u8>,
-    /// The sum of the weights of measured pixels.
+    /// The sum of the weights of measured pixels, and of the others.
     total: u64,
+    unmeasured: u64,
     /// The share of the weight of masked pixels without a depth that counts against a pose where it
     /// does not cover them.
     uncovered: f32,
@@ -62,29 +65,23 @@ impl TrustMap {
 
     fn new(observation: &Observation, diameter: f64) -> Self {
         let camera = observation.camera();
-        let region = widened(&observation.region(), camera);
-        // A coarse grid bounds the cost, which the first score of an observation pays.
-        let step = region.width().max(region.height()).div_ceil(SIDE).max(1);
-        let width = region.width().div_ceil(step).max(1);
         let (depth, mask) = (observation.depth(), observation.mask());
-        let n_cells = width * region.height().div_ceil(step);
-        let mut masked = Vec::with_capacity(n_cells);
-        let mut depths = Vec::with_capacity(n_cells);
-        for columns in rows(&region, depth.width()).step_by(step) {
-            masked.extend(mask.pixels()[columns.clone()].iter().step_by(step));
-            depths.extend(depth.pixels()[columns].iter().step_by(step));
-        }
-        let area = masked.iter().filter(|on| **on).count() * step * step;
-        let distances = to_border(&masked, width, step as f32);
-        let middle = middle_of(&depths, &distances);
+        let mut region = widened(&observation.region(), camera, BEYOND_PIXELS + 1.0);
+        let mut grid = Cells::of(observation, &region);
         let Surroundings { noise, plane } = *Surroundings::of(observation);
-        let grid = Cells {
-            width,
-            masked: &masked,
-            depths: &depths,
-        };
         let step_meters = STEP_METERS.max(4.0 * noise);
-        let doubt = 1.0 - certainty(&grid, step_meters);
+        let border = grid.border(step_meters);
+        let is_cut = border.is_cut() && is_measured_around(observation, grid.step);
+        if is_cut {
+            region = widened(&observation.region(), camera, CUT_PIXELS);
+            grid = Cells::of(observation, &region);
+        }
+        let doubt = 1.0 - border.certainty();
+        let (width, step) = (grid.width, grid.step);
+        let (masked, depths) = (&grid.masked, &grid.depths);
+        let area = masked.iter().filter(|on| **on).count() * step * step;
+        let distances = to_border(masked, width, step as f32);
+        let middle = middle_of(depths, &distances);
         let beyond = if plane.is_some() {
             doubt * BEYOND_PIXELS
         } else {
@@ -92,8 +89,7 @@ impl TrustMap {
         };
         let scale = 1.0 / (doubt * BORDER * (area as f32).sqrt() + beyond).max(1.0);
         let near = |z: f32| z > 0.0 && f64::from((z - middle).abs()) <= diameter;
-        let distances = distances.iter().zip(&depths);
-        let trust = distances.map(|([inside, outside], z)| {
+        let trust = distances.iter().zip(depths).map(|([inside, outside], z)| {
             let ramp = ((inside - outside + beyond) * scale).clamp(0.0, 1.0);
             if near(*z) { ramp * ramp } else { 0.0 }
         });
@@ -107,7 +103,7 @@ impl TrustMap {
                 .sum::<f32>();
             // An object that is as flat as the plane cannot be separated from it.
             let separable = kept > LEAST_KEPT * trust.iter().sum::<f32>();
-            for ((trust, off), on) in trust.iter_mut().zip(&off).zip(&masked) {
+            for ((trust, off), on) in trust.iter_mut().zip(&off).zip(masked) {
                 if separable {
                     *trust *= off;
                 } else if !on {
@@ -121,7 +117,7 @@ impl TrustMap {
             }
         }
         let mut weights = Vec::with_capacity(region.area());
-        let mut total = 0;
+        let (mut total, mut unmeasured) = (0, 0);
         let mut trusted = Vec::with_capacity(width * step);
         for (row, columns) in rows(&region, depth.width()).enumerate() {
             if row % step == 0 {
@@ -133,23 +129,29 @@ impl TrustMap {
                     trusted.extend(std::iter::repeat_n(trust, step));
                 }
             }
+            let to_mask = &distances[row / step * width..][..width];
+            let is_edge = |column: usize| is_cut && to_mask[column / step][1] <= CUT_PIXELS;
             let masked = mask.pixels()[columns.clone()].iter();
             let pixels = depth.pixels()[columns].iter().zip(masked).zip(&trusted);
-            total += pixels
-                .clone()
-                .map(|((z, _), trusted)| if *z > 0.0 { u64::from(*trusted) } else { 0 })
-                .sum::<u64>();
-            weights.extend(pixels.map(|((z, masked), trusted)| {
-                let unmeasured = if *masked { CERTAIN } else { 0 };
-                if *z > 0.0 { *trusted } else { unmeasured }
+            weights.extend(pixels.enumerate().map(|(column, ((z, masked), trusted))| {
+                if *z > 0.0 {
+                    total += u64::from(*trusted);
+                    *trusted
+                } else if *masked || is_edge(column) {
+                    unmeasured += u64::from(CERTAIN);
+                    CERTAIN
+                } else {
+                    0
+                }
             }));
         }
         Self {
             region,
             weights,
             total,
+            unmeasured,
             // The corners of a box are background, which may be without depth.
-            uncovered: if grid.mask_is_box() {
+            uncovered: if is_cut || grid.mask_is_box() {
                 0.0
             } else {
                 UNCOVERED * (1.0 - doubt)
@@ -171,6 +173,11 @@ impl TrustMap {
     /// Returns the sum of the weights of measured pixels.
     pub(crate) fn total(&self) -> u64 {
         self.total
+    }
+
+    /// Returns the sum of the weights of pixels without a depth.
+    pub(crate) fn unmeasured(&self) -> u64 {
+        self.unmeasured
     }
 
     /// Returns the share of the weight of masked pixels without a depth that counts against a pose
@@ -219,44 +226,30 @@ pub(crate) fn share_of(share: f32, weight: u64) -> u64 {
     part
 }
 
-/// Returns the certainty that the border of the mask is that of the object, 0 to 1.
+/// Returns whether most pixels some way around the box of the mask are measured.
 ///
-/// It is 1 if the depth has a step of `step_meters`, or is missing, at half of the border or more.
-/// A border that is too far outside crosses smooth background.
-fn certainty(cells: &Cells<'_>, step_meters: f64) -> f32 {
-    let (mut border, mut steps) = (0.0_f32, 0.0_f32);
-    cells.for_pairs(|a, b| {
-        if cells.masked[a] != cells.masked[b] {
-            let (a, b) = (cells.depths[a], cells.depths[b]);
-            let step = a <= 0.0 || b <= 0.0 || f64::from((a - b).abs()) > step_meters;
-            border += 1.0;
-            steps += f32::from(u8::from(step));
+/// Then pixels without a depth along the mask are a band, and not the whole background.
+fn is_measured_around(observation: &Observation, step: usize) -> bool {
+    let (region, camera) = (observation.region(), observation.camera());
+    let [inner, outer] = [1.0, 2.4].map(|bands| widened(&region, camera, bands * CUT_PIXELS));
+    let (mut all, mut measured) = (0_usize, 0_usize);
+    for (u, v) in outer.grid(step) {
+        if inner.index(u, v).is_none() {
+            all += 1;
+            measured += usize::from(observation.depth().get(u, v).is_some_and(|z| z > 0.0));
         }
-    });
-    if border > 0.0 {
-        (4.0 * steps / border - 1.0).clamp(0.0, 1.0)
-    } else {
-        1.0
     }
+    2 * measured > all
 }
 
-/// Widens a region by the border in which pixels outside the mask have a weight.
-fn widened(region: &PixelRegion, camera: &PinholeCamera) -> PixelRegion {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A small constant.
-    let border = BEYOND_PIXELS as u32 + 1;
+/// Widens a region by a border in pixels, in which pixels outside the mask have a weight.
+fn widened(region: &PixelRegion, camera: &PinholeCamera, border: f32) -> PixelRegion {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A small number.
+    let border = border as u32;
     if region.is_empty() {
         return *region;
     }
     region.grown(border).intersection(&camera.region())
-}
-
-/// Returns the places of the pixels of each row of a region in an image of some width.
-fn rows(region: &PixelRegion, image_width: u32) -> impl Iterator<Item = Range<usize>> + use<> {
-    let PixelRegion { u_min, u_max, .. } = *region;
-    (region.v_min..region.v_max).map(move |v| {
-        let start = v as usize * image_width as usize;
-        start + u_min as usize..start + u_max as usize
-    })
 }
 
 /// Returns the median depth of the inner half of the mask, meters, from distances to its border.

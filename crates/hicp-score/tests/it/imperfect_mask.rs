@@ -182,6 +182,27 @@ fn a_masked_part_without_depth_is_evidence_against_a_pose_that_leaves_it_out() {
     assert!(of_small > of_object + 0.1, "{of_object} {of_small}");
 }
 
+/// Some users cut a mask to the pixels with a depth. The object is then larger than the mask.
+#[test]
+fn pixels_without_depth_along_a_cut_mask_do_not_count() {
+    let (depth, mask) = scene();
+    let (core, near) = (grown(&mask, 4, true), grown(&mask, 3, false));
+    let pixels = || depth.iter().zip(core.iter().zip(&near));
+    let band = pixels().map(|(z, (core, near))| if *core || !near { *z } else { 0.0 });
+    let band = observe(band.collect(), core.clone());
+    // The background may also be too far away to be measured.
+    let alone = pixels().map(|(z, (core, _))| if *core { *z } else { 0.0 });
+    let alone = observe(alone.collect(), core.clone());
+    let [of_band, of_alone] = [&band, &alone].map(|observation| {
+        [
+            score(MeanVsd::imperfect_mask(), observation, &at()),
+            score(SampledMve::imperfect_mask(), observation, &at()),
+        ]
+    });
+    assert!(of_band[0] < 0.01 && of_band[1] < 0.1, "{of_band:?}");
+    assert!(of_alone.iter().all(|mve| *mve > 0.25), "{of_alone:?}");
+}
+
 #[test]
 fn a_mask_without_depth_explains_nothing() {
     let (depth, mask) = scene();
