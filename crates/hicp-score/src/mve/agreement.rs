@@ -114,8 +114,6 @@ pub(crate) struct Found {
     pub(crate) covered: u64,
     /// Rendered pixels outside the mask that are hidden, or inside a measured surface.
     pub(crate) nearer: u64,
-    /// Weight of the rendered pixels of the mask that were not measured.
-    pub(crate) unmeasured: u64,
 }
 
 impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreement<R> {
@@ -168,7 +166,6 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
                         some.outside[lane] += (outside_mask & seen & through) + near;
                         some.nearer[lane] += outside_mask & seen & front;
                         some.covered[lane] += weights[lane] & seen & known;
-                        some.unmeasured[lane] += weights[lane] & seen & !known;
                         certain[lane] = weights[lane] + near;
                         all_bits(certain[lane] > 0)
                     } else {
@@ -211,7 +208,6 @@ impl<'a, W: Weights + 'a, R: Iterator<Item = Row<'a, W>>> VectorLoop for Agreeme
             outside: sum(all.outside),
             covered: sum(all.covered),
             nearer: sum(all.nearer),
-            unmeasured: sum(all.unmeasured),
         }
     }
 }
@@ -228,7 +224,6 @@ struct Counts<T> {
     outside: [T; LANES],
     covered: [T; LANES],
     nearer: [T; LANES],
-    unmeasured: [T; LANES],
 }
 
 impl Counts<u64> {
@@ -246,7 +241,6 @@ impl Counts<u64> {
         add(&mut self.outside, &counts.outside);
         add(&mut self.covered, &counts.covered);
         add(&mut self.nearer, &counts.nearer);
-        add(&mut self.unmeasured, &counts.unmeasured);
         *counts = Counts::default();
     }
 }

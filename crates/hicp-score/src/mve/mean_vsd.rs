@@ -156,11 +156,15 @@ impl Compared<'_> {
         if trust.total() == 0 {
             return [1.0; N_TOLERANCES];
         }
-        let rows = self.rows().flat_map(|(v, row)| {
-            let parts = trust.parts(v, row.u, row.rendered.len());
-            parts.map(move |(columns, weights)| row.part(columns, weights))
-        });
-        let found = self.count(rows, trust.seen_through_meters());
+        let rows = || {
+            self.rows().flat_map(|(v, row)| {
+                let parts = trust.parts(v, row.u, row.rendered.len());
+                parts.map(move |(columns, weights)| row.part(columns, weights))
+            })
+        };
+        let found = self.count(rows(), trust.seen_through_meters());
+        // Another counter in the loop over all pixels would double its instructions.
+        let covered: u64 = rows().map(|row| unmeasured(&row)).sum();
         // A pixel behind a measured surface counts if the object reaches into that surface.
         let share = if found.nearer as f64 > LEAST_NEARER * (found.covered + found.nearer) as f64 {
             let mut grid = Grid::new(self.diameter);
@@ -171,12 +175,22 @@ impl Compared<'_> {
         };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A share of a count.
         let inside = (found.nearer as f64 * share) as u64;
-        let uncovered = share_of(trust.uncovered(), trust.unmeasured() - found.unmeasured);
+        let uncovered = share_of(trust.uncovered(), trust.unmeasured() - covered);
         errors(
             found.correct,
             trust.total() + found.outside + inside + uncovered,
         )
     }
+}
+
+/// Returns the weight of the rendered pixels of a row without a measured depth.
+fn unmeasured(row: &Row<'_, Option<&[u8]>>) -> u64 {
+    let Some(weights) = row.mask else { return 0 };
+    let pixels = row.rendered.iter().zip(row.observed).zip(weights);
+    let weight = pixels.map(|((rendered, observed), weight)| {
+        u32::from(*weight) * u32::from((*rendered > 0.0) & (*observed <= 0.0))
+    });
+    weight.sum::<u32>().into()
 }
 
 impl Score for MeanVsd {
