@@ -163,8 +163,6 @@ impl Compared<'_> {
             })
         };
         let found = self.count(rows(), trust.seen_through_meters());
-        // Another counter in the loop over all pixels would double its instructions.
-        let covered: u64 = rows().map(|row| unmeasured(&row)).sum();
         // A pixel behind a measured surface counts if the object reaches into that surface.
         let share = if found.nearer as f64 > LEAST_NEARER * (found.covered + found.nearer) as f64 {
             let mut grid = Grid::new(self.diameter);
@@ -175,7 +173,13 @@ impl Compared<'_> {
         };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A share of a count.
         let inside = (found.nearer as f64 * share) as u64;
-        let uncovered = share_of(trust.uncovered(), trust.unmeasured() - covered);
+        let uncovered = if trust.uncovered() > 0.0 {
+            // Another counter in the loop over all pixels would double its instructions.
+            let covered: u64 = rows().map(|row| unmeasured(&row)).sum();
+            share_of(trust.uncovered(), trust.unmeasured() - covered)
+        } else {
+            0
+        };
         errors(
             found.correct,
             trust.total() + found.outside + inside + uncovered,
