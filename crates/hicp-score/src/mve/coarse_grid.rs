@@ -21,10 +21,10 @@ pub(crate) struct CoarseGrid {
     pub(crate) one: u32,
     /// The sum of the weights of measured pixels.
     pub(crate) total: u64,
-    /// The same of masked pixels without a depth, and the share that counts against a pose where it
-    /// does not cover them.
-    unmeasured: u64,
-    uncovered: f32,
+    /// The share of the weight of masked pixels without a depth that counts against a pose where it
+    /// does not cover them, and the places of these pixels in a buffer.
+    uncovered_share: f32,
+    unmeasured: Vec<usize>,
     /// The distance behind the rendered surface from which on the camera sees through it; `None`
     /// for an exact mask.
     pub(crate) seen_through_meters: Option<f64>,
@@ -73,7 +73,7 @@ impl CoarseGrid {
                 let weight = |(u, v), _| trust.weight(u, v).into();
                 Self {
                     one: CERTAIN.into(),
-                    uncovered: trust.uncovered(),
+                    uncovered_share: trust.uncovered_share(),
                     seen_through_meters: Some(trust.seen_through_meters()),
                     ..Self::new(fine, factor, trust.region(), weight)
                 }
@@ -92,8 +92,10 @@ impl CoarseGrid {
     ) -> Self {
         let camera = fine.camera().scaled_down(factor);
         let region = region.decimated(factor);
-        let (mut total, mut unmeasured) = (0, 0);
+        let (mut total, mut unmeasured) = (0, Vec::new());
+        let stride = camera.width() as usize + PADDING;
         let pixel = |(u, v): (u32, u32)| {
+            let place = v as usize * stride + u as usize;
             let (u, v) = (u * factor, v * factor);
             let masked = fine.mask().get(u, v) == Some(true);
             let certainty = weight((u, v), masked);
@@ -105,8 +107,8 @@ impl CoarseGrid {
                     let counts = |place| 2 * weight(place, true) >= certainty;
                     measured = median_around(fine, (u, v), factor, counts);
                 }
-            } else {
-                unmeasured += u64::from(certainty);
+            } else if certainty > 0 {
+                unmeasured.push(place);
             }
             (measured, certainty)
         };
@@ -115,8 +117,8 @@ impl CoarseGrid {
             camera,
             one: 1,
             total,
+            uncovered_share: 0.0,
             unmeasured,
-            uncovered: 0.0,
             seen_through_meters: None,
             depth: Arc::clone(fine.shared_depth()),
             factor,
@@ -126,11 +128,16 @@ impl CoarseGrid {
         }
     }
 
-    /// Returns the weight of the masked pixels without a depth that a pose does not cover.
+    /// Returns the weight with which masked pixels without a depth count against a pose.
     ///
-    /// `covered` is the weight of those that it covers.
-    pub(crate) fn uncovered(&self, covered: u64) -> u64 {
-        share_of(self.uncovered, self.unmeasured - covered)
+    /// `buffer` has the inverse depths of the pose, as for [`CompareCoarse`].
+    pub(crate) fn uncovered(&self, buffer: &[f32]) -> u64 {
+        if self.uncovered_share <= 0.0 {
+            return 0;
+        }
+        let pixels = self.unmeasured.iter();
+        let missed = pixels.filter(|place| buffer[**place] <= 0.0).count();
+        share_of(self.uncovered_share, missed as u64 * u64::from(self.one))
     }
 
     /// Number of pixels from one row of a buffer to the next.
@@ -214,8 +221,8 @@ const MOST_PIXELS: usize = 1 << 20;
 
 /// The loop that compares the touched pixels of a buffer with a grid, and clears them.
 ///
-/// It returns the weights of pixels that agree, summed over the tolerances, the weights that pixels
-/// outside the mask lack, and the weights of masked pixels without a measured depth.
+/// It returns the weights of pixels that agree, summed over the tolerances, and the weights that
+/// pixels outside the mask lack. A third counter would double its instructions.
 pub(crate) struct CompareCoarse<'a> {
     pub(crate) grid: &'a CoarseGrid,
     /// The columns and rows that contain the touched pixels.
@@ -230,16 +237,16 @@ pub(crate) struct CompareCoarse<'a> {
 }
 
 impl VectorLoop for CompareCoarse<'_> {
-    type Output = [u64; 3];
+    type Output = [u64; 2];
 
     #[inline(always)]
-    fn run(self) -> [u64; 3] {
+    fn run(self) -> [u64; 2] {
         #[allow(clippy::cast_possible_truncation)] // A small constant.
         let most = N_TOLERANCES as u32;
         let grid = self.grid;
         let [columns, rows] = self.touched;
-        let mut all = [0; 3];
-        let mut some = [[0_u32; LANES]; 3];
+        let mut all = [0; 2];
+        let mut some = [[0_u32; LANES]; 2];
         let mut pixels = 0;
         for v in rows {
             let row = grid.row(v);
@@ -260,7 +267,6 @@ impl VectorLoop for CompareCoarse<'_> {
                     some[0][lane] += touched & known & ((most - beyond) * weight[lane]);
                     let hidden = known & all_bits(behind > self.hidden_beyond);
                     some[1][lane] += touched & !hidden & (grid.one - weight[lane]);
-                    some[2][lane] += touched & !known & weight[lane];
                 }
                 pixels += LANES;
                 if pixels >= MOST_PIXELS {
@@ -285,7 +291,7 @@ fn lanes<T>(numbers: &[T], first: usize) -> &[T; LANES] {
 
 /// Adds sums of lanes to sums.
 #[inline(always)]
-fn add(all: &mut [u64; 3], some: &[[u32; LANES]; 3]) {
+fn add(all: &mut [u64; 2], some: &[[u32; LANES]; 2]) {
     for (all, lanes) in all.iter_mut().zip(some) {
         *all += lanes.iter().map(|lane| u64::from(*lane)).sum::<u64>();
     }

@@ -8,7 +8,7 @@ use crate::judgment::insides::inside_share;
 use crate::mve::agreement::{Agreement, Found, Row, Weights};
 use crate::mve::mask_trust::MaskTrust;
 use crate::mve::occlusion::Occlusion;
-use crate::mve::trust_map::{TrustMap, share_of};
+use crate::mve::trust_map::TrustMap;
 use crate::score::Score;
 use crate::tolerances::{N_TOLERANCES, errors, mean};
 
@@ -156,13 +156,11 @@ impl Compared<'_> {
         if trust.total() == 0 {
             return [1.0; N_TOLERANCES];
         }
-        let rows = || {
-            self.rows().flat_map(|(v, row)| {
-                let parts = trust.parts(v, row.u, row.rendered.len());
-                parts.map(move |(columns, weights)| row.part(columns, weights))
-            })
-        };
-        let found = self.count(rows(), trust.seen_through_meters());
+        let rows = self.rows().flat_map(|(v, row)| {
+            let parts = trust.parts(v, row.u, row.rendered.len());
+            parts.map(move |(columns, weights)| row.part(columns, weights))
+        });
+        let found = self.count(rows, trust.seen_through_meters());
         // A pixel behind a measured surface counts if the object reaches into that surface.
         let share = if found.nearer as f64 > LEAST_NEARER * (found.covered + found.nearer) as f64 {
             let mut grid = Grid::new(self.diameter);
@@ -173,28 +171,9 @@ impl Compared<'_> {
         };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // A share of a count.
         let inside = (found.nearer as f64 * share) as u64;
-        let uncovered = if trust.uncovered() > 0.0 {
-            // Another counter in the loop over all pixels would double its instructions.
-            let covered: u64 = rows().map(|row| unmeasured(&row)).sum();
-            share_of(trust.uncovered(), trust.unmeasured() - covered)
-        } else {
-            0
-        };
-        errors(
-            found.correct,
-            trust.total() + found.outside + inside + uncovered,
-        )
+        let union = trust.total() + found.outside + inside + trust.uncovered(self.view);
+        errors(found.correct, union)
     }
-}
-
-/// Returns the weight of the rendered pixels of a row without a measured depth.
-fn unmeasured(row: &Row<'_, Option<&[u8]>>) -> u64 {
-    let Some(weights) = row.mask else { return 0 };
-    let pixels = row.rendered.iter().zip(row.observed).zip(weights);
-    let weight = pixels.map(|((rendered, observed), weight)| {
-        u32::from(*weight) * u32::from((*rendered > 0.0) & (*observed <= 0.0))
-    });
-    weight.sum::<u32>().into()
 }
 
 impl Score for MeanVsd {

@@ -110,7 +110,8 @@ impl SampledMve {
         // The tolerances are multiples of a twentieth of the diameter.
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of depth.
         let (per_meter, hidden_beyond) = ((20.0 / diameter) as f32, hidden_beyond as f32);
-        let [agreement, outside, covered] = vectorized(CompareCoarse {
+        let uncovered = grid.uncovered(&self.buffer);
+        let [agreement, outside] = vectorized(CompareCoarse {
             touched,
             buffer: &mut self.buffer,
             grid,
@@ -120,7 +121,7 @@ impl SampledMve {
         if grid.total == 0 {
             return 1.0;
         }
-        let union = grid.total + outside + grid.uncovered(covered);
+        let union = grid.total + outside + uncovered;
         let most = N_TOLERANCES as u64 * union;
         (most - agreement) as f64 / most as f64
     }

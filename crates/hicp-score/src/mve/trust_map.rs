@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use hicp_core::internal::{Surroundings, median};
-use hicp_core::{Observation, PinholeCamera, PixelRegion};
+use hicp_core::{Observation, PinholeCamera, PixelRegion, RenderedView};
 
 use crate::mve::cells::{Cells, rows};
 use crate::mve::distances::to_border;
@@ -43,12 +43,12 @@ pub(crate) struct TrustMap {
     /// Masked pixels without a measured depth have the full weight, so that they do not count
     /// against a pose. So do those near a mask that was cut to measured pixels.
     weights: Vec<u8>,
-    /// The sum of the weights of measured pixels, and of the others.
+    /// The sum of the weights of measured pixels.
     total: u64,
-    unmeasured: u64,
     /// The share of the weight of masked pixels without a depth that counts against a pose where it
-    /// does not cover them.
-    uncovered: f32,
+    /// does not cover them, and these pixels if it is not 0.
+    uncovered_share: f32,
+    unmeasured: Vec<(u32, u32)>,
     /// Standard deviation of the depth noise, meters.
     noise: f64,
 }
@@ -117,9 +117,15 @@ impl TrustMap {
             }
         }
         let mut weights = Vec::with_capacity(region.area());
-        let (mut total, mut unmeasured) = (0, 0);
+        // The corners of a box are background, which may be without depth.
+        let uncovered_share = if is_cut || grid.mask_is_box() {
+            0.0
+        } else {
+            UNCOVERED * (1.0 - doubt)
+        };
+        let (mut total, mut unmeasured) = (0, Vec::new());
         let mut trusted = Vec::with_capacity(width * step);
-        for (row, columns) in rows(&region, depth.width()).enumerate() {
+        for ((row, columns), v) in rows(&region, depth.width()).enumerate().zip(region.v_min..) {
             if row % step == 0 {
                 trusted.clear();
                 for trust in &trust[row / step * width..][..width] {
@@ -133,12 +139,15 @@ impl TrustMap {
             let is_edge = |column: usize| is_cut && to_mask[column / step][1] <= CUT_PIXELS;
             let masked = mask.pixels()[columns.clone()].iter();
             let pixels = depth.pixels()[columns].iter().zip(masked).zip(&trusted);
-            weights.extend(pixels.enumerate().map(|(column, ((z, masked), trusted))| {
+            let pixels = pixels.enumerate().zip(region.u_min..);
+            weights.extend(pixels.map(|((column, ((z, masked), trusted)), u)| {
                 if *z > 0.0 {
                     total += u64::from(*trusted);
                     *trusted
                 } else if *masked || is_edge(column) {
-                    unmeasured += u64::from(CERTAIN);
+                    if uncovered_share > 0.0 {
+                        unmeasured.push((u, v));
+                    }
                     CERTAIN
                 } else {
                     0
@@ -149,13 +158,8 @@ impl TrustMap {
             region,
             weights,
             total,
+            uncovered_share,
             unmeasured,
-            // The corners of a box are background, which may be without depth.
-            uncovered: if is_cut || grid.mask_is_box() {
-                0.0
-            } else {
-                UNCOVERED * (1.0 - doubt)
-            },
             noise,
         }
     }
@@ -175,15 +179,17 @@ impl TrustMap {
         self.total
     }
 
-    /// Returns the sum of the weights of pixels without a depth.
-    pub(crate) fn unmeasured(&self) -> u64 {
-        self.unmeasured
-    }
-
     /// Returns the share of the weight of masked pixels without a depth that counts against a pose
     /// where it does not cover them.
-    pub(crate) fn uncovered(&self) -> f32 {
-        self.uncovered
+    pub(crate) fn uncovered_share(&self) -> f32 {
+        self.uncovered_share
+    }
+
+    /// Returns the weight with which masked pixels without a depth count against a render.
+    pub(crate) fn uncovered(&self, view: &RenderedView) -> u64 {
+        let pixels = self.unmeasured.iter();
+        let missed = pixels.filter(|(u, v)| view.depth_at(*u, *v) <= 0.0).count();
+        share_of(self.uncovered_share, missed as u64 * u64::from(CERTAIN))
     }
 
     /// Returns the weight of a pixel.
