@@ -49,6 +49,8 @@ impl Calibration {
             max_mve: Some(0.25),
             max_mahalanobis_squared: Some(100.0),
             restart_after: Some(3),
+            // Typical of an arm: the hand-eye calibration, and the time of an image.
+            camera_error: [0.001, 0.002],
         },
     };
 

@@ -128,7 +128,7 @@ pub enum Update {
     Provisional(Failure, Solution),
     /// The estimate was not fused.
     Rejected(Failure),
-    /// The estimate contradicts the held ones, as those before it did.
+    /// The estimate contradicts the held ones, as those before it did, which agree with it.
     ///
     /// Everything held was removed, and the estimate is the new start.
     Restarted(Failure, Solution),

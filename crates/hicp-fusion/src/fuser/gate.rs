@@ -1,8 +1,10 @@
 //! A gate that keeps failed estimates from moving the fused pose.
 
+use hicp_core::{Matrix6, Vector6};
+
 use crate::estimate::{FusionError, PoseEstimate};
 use crate::fuser::fuser_trait::{Failure, Fuser, Update};
-use crate::motion::CameraMotion;
+use crate::motion::{CameraMotion, Transport};
 use crate::solution::Solution;
 
 /// The 99.9 % quantile of the χ² distribution with 6 degrees of freedom.
@@ -19,22 +21,32 @@ pub struct Gate {
     pub max_mve: Option<f64>,
     /// Largest squared Mahalanobis distance from the held estimate; `None` for no limit.
     ///
-    /// It combines both covariances, and is only as good as they are: χ²₆ if they are right.
+    /// It combines both covariances and the error of the camera, and is only as good as they are:
+    /// χ²₆ if they are right.
     pub max_mahalanobis_squared: Option<f64>,
-    /// Number of consecutive contradicting estimates that restart the fuser.
+    /// Number of consecutive estimates that contradict the held one, but not each other, after
+    /// which the fuser restarts.
     ///
     /// Then the held estimate is probably the wrong one: it is removed, and the last contradicting
     /// one is the new start. `None` and 0 never restart.
     pub restart_after: Option<usize>,
+    /// Standard deviations of the error of the camera between two images, along and around each of
+    /// its axes: meters and radians.
+    ///
+    /// The distance of an estimate allows for it. It does not weigh estimates: for that, give each
+    /// [`CameraMotion`] a covariance.
+    pub camera_error: [f64; 2],
 }
 
 impl Default for Gate {
-    /// The paper's threshold, an MVE of 0.4; 22.458, the 99.9 % quantile of χ²₆; restart after 3.
+    /// The paper's threshold, an MVE of 0.4; 22.458, the 99.9 % quantile of χ²₆; restart after 3;
+    /// exact motions of the camera.
     fn default() -> Self {
         Self {
             max_mve: Some(0.4),
             max_mahalanobis_squared: Some(CHI_SQUARED_6_999),
             restart_after: Some(3),
+            camera_error: [0.0; 2],
         }
     }
 }
@@ -66,8 +78,9 @@ pub struct Gated<F> {
     gate: Gate,
     /// `true` if the held estimate failed the gate.
     provisional: bool,
-    /// Number of consecutive estimates that were too far away.
-    contradictions: usize,
+    /// The last estimate, if it was too far away, and the number of such estimates in a row that
+    /// agree with each other.
+    contradicting: Option<(PoseEstimate, usize)>,
 }
 
 impl<F: Fuser> Gated<F> {
@@ -83,6 +96,8 @@ impl<F: Fuser> Gated<F> {
                 "largest squared Mahalanobis distance",
                 gate.max_mahalanobis_squared,
             ),
+            ("error of the camera, meters", Some(gate.camera_error[0])),
+            ("error of the camera, radians", Some(gate.camera_error[1])),
         ] {
             if let Some(value) = limit.filter(|limit| limit.is_nan() || *limit < 0.0) {
                 return Err(FusionError::Parameter {
@@ -96,7 +111,7 @@ impl<F: Fuser> Gated<F> {
             inner,
             gate,
             provisional: false,
-            contradictions: 0,
+            contradicting: None,
         })
     }
 
@@ -113,14 +128,18 @@ impl<F: Fuser> Gated<F> {
 
     fn distance_failure(&self, estimate: &PoseEstimate, held: &PoseEstimate) -> Option<Failure> {
         let limit = self.gate.max_mahalanobis_squared?;
-        let found = estimate.mahalanobis_squared(held);
+        let [meters, radians] = self.gate.camera_error.map(|error| error * error);
+        let variances = Vector6::from_fn(|i, _| if i < 3 { meters } else { radians });
+        let mut held = *held;
+        held.covariance += Matrix6::from_diagonal(&variances);
+        let found = estimate.mahalanobis_squared(&held);
         (found > limit).then_some(Failure::Mahalanobis { found, limit })
     }
 
     /// Replaces everything held by an estimate.
     fn replace(&mut self, estimate: &PoseEstimate) -> Solution {
         self.inner.reset();
-        self.contradictions = 0;
+        self.contradicting = None;
         // The inner fuser may have another gate and reject the estimate.
         let update = self.inner.update(estimate);
         update.solution().copied().unwrap_or(Solution::NONE)
@@ -130,6 +149,9 @@ impl<F: Fuser> Gated<F> {
 impl<F: Fuser> Fuser for Gated<F> {
     fn propagate(&mut self, motion: &CameraMotion) {
         self.inner.propagate(motion);
+        if let Some((last, _)) = &mut self.contradicting {
+            *last = motion.carry(last, Transport::Adjoint);
+        }
     }
 
     fn update(&mut self, estimate: &PoseEstimate) -> Update {
@@ -154,13 +176,20 @@ impl<F: Fuser> Fuser for Gated<F> {
             return Update::Accepted(self.replace(estimate));
         }
         if let Some(failure) = self.distance_failure(estimate, &held) {
-            self.contradictions += 1;
-            if self.gate.restart_after == Some(self.contradictions) {
+            // Outliers that also contradict each other do not replace what is held.
+            let agrees =
+                |(last, _): &(PoseEstimate, usize)| self.distance_failure(estimate, last).is_none();
+            let count = 1 + self
+                .contradicting
+                .filter(agrees)
+                .map_or(0, |(_, count)| count);
+            if self.gate.restart_after == Some(count) {
                 return Update::Restarted(failure, self.replace(estimate));
             }
+            self.contradicting = Some((*estimate, count));
             return Update::Rejected(failure);
         }
-        self.contradictions = 0;
+        self.contradicting = None;
         self.inner.update(estimate)
     }
 
@@ -171,7 +200,7 @@ impl<F: Fuser> Fuser for Gated<F> {
     fn reset(&mut self) {
         self.inner.reset();
         self.provisional = false;
-        self.contradictions = 0;
+        self.contradicting = None;
     }
 
     fn name(&self) -> &'static str {

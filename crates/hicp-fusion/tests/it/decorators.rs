@@ -138,6 +138,7 @@ fn the_held_estimate_passes_any_limit() {
         max_mve: Some(0.0),
         max_mahalanobis_squared: Some(0.0),
         restart_after: None,
+        ..Gate::default()
     });
     for _ in 0..2 {
         assert!(matches!(fuser.update(&at(0.1, 0.0)), Update::Accepted(_)));
@@ -167,8 +168,58 @@ fn an_estimate_that_all_others_contradict_is_dropped() {
 }
 
 #[test]
+fn outliers_that_contradict_each_other_replace_nothing() {
+    let mut fuser = average(Gate::default());
+    fuser.update(&at(0.0, 0.1));
+    for offset in [0.2, -0.3, 0.4, -0.2, 0.3] {
+        assert!(matches!(
+            fuser.update(&at(offset, 0.1)),
+            Update::Rejected(_)
+        ));
+    }
+    assert_eq!(x(&fuser), 0.0);
+    // Those that agree do, also in the frames of a moving camera.
+    let aside = CameraMotion::new(Isometry3::translation(0.1, 0.0, 0.0)).unwrap();
+    let mut last = fuser.update(&at(0.2, 0.1));
+    for offset in [0.3, 0.4] {
+        fuser.propagate(&aside);
+        last = fuser.update(&at(offset, 0.1));
+    }
+    assert!(matches!(last, Update::Restarted(..)), "{last:?}");
+    assert_eq!(x(&fuser), 0.4);
+}
+
+/// An error of the camera moves and rotates the poses of all objects around it.
+#[test]
+fn a_gate_allows_for_the_error_of_the_camera() {
+    let passes = |camera_error, error: Isometry3<f64>| {
+        let mut fuser = average(Gate {
+            camera_error,
+            ..Gate::default()
+        });
+        let pose = Isometry3::translation(0.0, 0.0, 0.5);
+        let covariance = Matrix6::identity() * 1e-10;
+        fuser.update(&estimate(pose, covariance));
+        fuser.update(&estimate(error * pose, covariance)).is_taken()
+    };
+    let shift = |x| Isometry3::translation(x, 0.0, 0.0);
+    let turn = |y| Isometry3::rotation(Vector3::y() * y);
+    assert!(!passes([0.0, 0.002], shift(0.004)));
+    assert!(passes([0.001, 0.0], shift(0.004)));
+    assert!(!passes([0.001, 0.0], shift(0.005)));
+    assert!(!passes([0.001, 0.0], turn(0.008)));
+    assert!(passes([0.0, 0.002], turn(0.008)));
+    assert!(!passes([0.0, 0.002], turn(0.01)));
+}
+
+#[test]
 fn a_gate_of_nan_is_refused() {
     for limit in [f64::NAN, -1.0] {
+        let camera = Gate {
+            camera_error: [0.0, limit],
+            ..Gate::default()
+        };
+        assert!(Gated::new(aware(), camera).is_err());
         let gate = Gate {
             max_mve: Some(limit),
             ..Gate::default()

@@ -960,6 +960,25 @@ class PoseEstimate:
     def __new__(cls, T_co: npt.ArrayLike, covariance: npt.ArrayLike, *, mve: float | None=None) -> PoseEstimate:
         ...
 
+    @staticmethod
+    def from_result(result: Result, model: Model) -> PoseEstimate:
+        """Creates the estimate of a refined pose, with a covariance about as wide as the error.
+
+        The covariance of a result accounts for the noise of its pixels alone. This one has the
+        factors of `SequentialEstimator(…, covariance="calibrated")`, and a wrong pose with a high
+        MVE gets little weight. It leaves out the error of the mesh, which fusion does not average
+        out.
+
+        Parameters
+        ----------
+        result : Result
+        model : Model
+
+        Returns
+        -------
+        PoseEstimate
+        """
+
     @property
     def T_co(self) -> _Array:
         """The pose, camera from object, shape (4, 4), float64, meters."""
@@ -1006,8 +1025,8 @@ class Fuser:
     max_mve, max_mahalanobis_squared : float, optional
         The gate. Estimates above one of these limits are rejected.
     restart_after : int, optional
-        Number of consecutive estimates above `max_mahalanobis_squared` after which the fuser starts
-        again. Without that limit, it has no effect.
+        Number of consecutive estimates above `max_mahalanobis_squared` that agree with each other,
+        after which the fuser starts again. Without that limit, it has no effect.
     window : int, optional
         Maximum number of estimates that "average" and "weighted-average" keep, the newest ones.
     transport : {"adjoint", "kept"}, optional
@@ -1076,7 +1095,8 @@ class SequentialEstimator:
     """Estimates the pose of a static object from the images of a moving camera (§V of the paper).
 
     Each image is registered from the fused pose, moved with the camera. The registered pose is then
-    fused, and the next image starts from the result.
+    fused, and the next image starts from the result. While all images have failed a limit
+    ("provisional"), the next one is also registered from the initial pose.
 
     Parameters
     ----------
@@ -1095,9 +1115,11 @@ class SequentialEstimator:
         Covariance of the estimates. "calibrated" is the default, unless `paper` is true, which
         requires "mve". It is about as wide as the errors: the covariance of the registration, with
         factors that were fitted to "hybrid" and to models reconstructed from images. It also
-        rejects estimates with an MVE above 0.25, and those that are far from the fused pose. "mve"
-        is a weight: the MVE in units of the object. It is not calibrated, so do not use it as an
-        error.
+        rejects estimates with an MVE above 0.25, and those whose squared Mahalanobis distance from
+        the fused pose is above 100. The distance allows for a camera that is off by 1 mm and 0.11°
+        along and around each axis. After three such estimates that agree with each other, it starts
+        again from the last. "mve" is a weight: the MVE in units of the object. It is not
+        calibrated, so do not use it as an error.
         `bop sequence` names them `--uncertainty registration` and `--uncertainty mve`.
     """
 

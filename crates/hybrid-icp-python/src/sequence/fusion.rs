@@ -2,6 +2,7 @@
 
 use std::sync::Mutex;
 
+use hybrid_icp::Calibration;
 use hybrid_icp::fusion::{
     BoxedFuser, CameraMotion, Fuser as _, FuserConfig, FusionLimits, FusionMethod, Gate, Gated,
     PoseEstimate, SymmetryAware, Transport, UnitCovariance,
@@ -54,6 +55,36 @@ impl PyPoseEstimate {
             None => estimate,
         };
         Ok(Self(estimate))
+    }
+
+    /// Creates the estimate of a refined pose, with a covariance about as wide as the error.
+    ///
+    /// The covariance of a result accounts for the noise of its pixels alone. This one has the
+    /// factors of `SequentialEstimator(…, covariance="calibrated")`, and a wrong pose with a high
+    /// MVE gets little weight. It leaves out the error of the mesh, which fusion does not average
+    /// out.
+    ///
+    /// Parameters
+    /// ----------
+    /// result : Result
+    /// model : Model
+    ///
+    /// Returns
+    /// -------
+    /// PoseEstimate
+    #[staticmethod]
+    fn from_result(result: &Bound<'_, PyAny>, model: &Bound<'_, PyModel>) -> PyResult<Self> {
+        let model = &model.get().model;
+        let motion = array::motion(&result.getattr("T_co")?, "result.T_co")?.isometry;
+        let mve: f64 = result.getattr("mve")?.extract()?;
+        let known: Option<Bound<'_, PyAny>> = result.getattr("covariance")?.extract()?;
+        let known = known.map(|known| array::matrix6(&known, "result.covariance"));
+        let unit = UnitCovariance::about_object(model.center(), model.radius());
+        let model = Calibration::HYBRID.covariance(unit.map_err(errors::input)?);
+        let covariance = model.covariance(&motion, Some(mve), known.transpose()?.as_ref());
+        let estimate = PoseEstimate::new(motion, covariance);
+        let estimate = estimate.and_then(|estimate| estimate.with_mve(mve));
+        estimate.map(Self).map_err(errors::input)
     }
 
     /// The pose, camera from object, shape (4, 4), float64, meters.
@@ -148,8 +179,8 @@ pub(crate) fn fuse(estimates: Vec<PyPoseEstimate>) -> PyResult<PyPoseEstimate> {
 /// max_mve, max_mahalanobis_squared : float, optional
 ///     The gate. Estimates above one of these limits are rejected.
 /// restart_after : int, optional
-///     Number of consecutive estimates above `max_mahalanobis_squared` after which the fuser starts
-///     again. Without that limit, it has no effect.
+///     Number of consecutive estimates above `max_mahalanobis_squared` that agree with each other,
+///     after which the fuser starts again. Without that limit, it has no effect.
 /// window : int, optional
 ///     Maximum number of estimates that "average" and "weighted-average" keep, the newest ones.
 /// transport : {"adjoint", "kept"}, optional
@@ -206,6 +237,7 @@ impl PyFuser {
             max_mve,
             max_mahalanobis_squared,
             restart_after,
+            ..Gate::default()
         };
         let mut fuser = method.build(config);
         if max_mve.is_some() || max_mahalanobis_squared.is_some() {

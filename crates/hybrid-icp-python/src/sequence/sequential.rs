@@ -18,7 +18,8 @@ use crate::sequence::fusion::{self, PyPoseEstimate};
 /// Estimates the pose of a static object from the images of a moving camera (§V of the paper).
 ///
 /// Each image is registered from the fused pose, moved with the camera. The registered pose is then
-/// fused, and the next image starts from the result.
+/// fused, and the next image starts from the result. While all images have failed a limit
+/// ("provisional"), the next one is also registered from the initial pose.
 ///
 /// Parameters
 /// ----------
@@ -37,9 +38,11 @@ use crate::sequence::fusion::{self, PyPoseEstimate};
 ///     Covariance of the estimates. "calibrated" is the default, unless `paper` is true, which
 ///     requires "mve". It is about as wide as the errors: the covariance of the registration, with
 ///     factors that were fitted to "hybrid" and to models reconstructed from images. It also
-///     rejects estimates with an MVE above 0.25, and those that are far from the fused pose. "mve"
-///     is a weight: the MVE in units of the object. It is not calibrated, so do not use it as an
-///     error.
+///     rejects estimates with an MVE above 0.25, and those whose squared Mahalanobis distance from
+///     the fused pose is above 100. The distance allows for a camera that is off by 1 mm and 0.11°
+///     along and around each axis. After three such estimates that agree with each other, it starts
+///     again from the last. "mve" is a weight: the MVE in units of the object. It is not
+///     calibrated, so do not use it as an error.
 ///     `bop sequence` names them `--uncertainty registration` and `--uncertainty mve`.
 #[pyclass(frozen, module = "hybrid_icp", name = "SequentialEstimator")]
 pub(crate) struct PySequentialEstimator {

@@ -29,13 +29,20 @@ pub use crate::sequential::step::{
 /// [`SequentialEstimator::calibrated`] fuse.
 const WINDOW: usize = 100;
 
+/// Difference in score up to which a registration from the initial pose is preferred to one from a
+/// pose that failed the gate.
+const PREFERRED: f64 = 0.02;
+
 /// Estimates the pose of a static object from images along the path of a moving camera (§V).
 ///
 /// Each image is registered from the pose fused so far, moved with the camera. The fuser receives
 /// the result, and its estimate is the answer and the next initial pose (§V-A). If ICP finds no
-/// pairs, nothing is fused ([`WithoutPairs`]). The estimator has no clock and starts no thread.
+/// pairs, nothing is fused ([`WithoutPairs`]). While all estimates have failed a gate, an image is
+/// also registered from the initial pose, because the first image may show another object. The
+/// estimator has no clock and starts no thread.
 ///
-/// Cost of a step: the pipeline, and one render and one score if the MVE is computed.
+/// Cost of a step: the pipeline, and one render and one score if the MVE is computed. While all
+/// estimates have failed, twice as much.
 ///
 /// ```
 /// use hybrid_icp::fusion::{CameraMotion, FusionMethod};
@@ -74,6 +81,8 @@ pub struct SequentialEstimator {
     workspace: Workspace,
     /// The initial pose in the current camera frame.
     init: Isometry3<f64>,
+    /// `true` if the fused pose failed a gate.
+    provisional: bool,
 }
 
 /// The covariance of an estimate, from the outcome of its registration and its score.
@@ -102,6 +111,7 @@ impl SequentialEstimator {
             without_pairs: config.without_pairs,
             workspace: Workspace::new(Rasterizer::default()),
             init: *init,
+            provisional: false,
         };
         estimator.restart(init)?;
         Ok(estimator)
@@ -259,6 +269,7 @@ impl SequentialEstimator {
         // The checks of an estimate are those of an initial pose.
         self.init = *PoseEstimate::new(*init, Matrix6::zeros())?.camera_from_object();
         self.fuser.reset();
+        self.provisional = false;
         if let Some(undetermined) = &mut self.undetermined {
             undetermined.clear();
         }
@@ -327,13 +338,18 @@ impl SequentialEstimator {
         observer: &mut dyn Observer,
     ) -> SequentialStep {
         self.move_camera(motion);
-        let init = self.camera_from_object();
+        let mut init = self.camera_from_object();
         let problem = Problem::new(model, observation);
-        let outcome = self.stage.run(
-            &problem,
-            &init,
-            &mut Session::new(&mut self.workspace, observer),
-        );
+        let mut outcome = self.register(&problem, &init, observer);
+        if self.provisional {
+            // The failed image may have moved the pose away from a good initial one.
+            let first = self.init;
+            let again = self.register(&problem, &first, observer);
+            let mut score = |outcome| self.score(&problem, outcome).unwrap_or(0.0);
+            if score(&again) < score(&outcome) + PREFERRED {
+                (init, outcome) = (first, again);
+            }
+        }
         let (mve, event) = self.take(&problem, &outcome);
         SequentialStep {
             camera_from_object: self.camera_from_object(),
@@ -345,9 +361,30 @@ impl SequentialEstimator {
         }
     }
 
+    /// Registers an image from an initial pose.
+    fn register(
+        &mut self,
+        problem: &Problem<'_>,
+        init: &Isometry3<f64>,
+        observer: &mut dyn Observer,
+    ) -> Outcome {
+        let mut session = Session::new(&mut self.workspace, observer);
+        self.stage.run(problem, init, &mut session)
+    }
+
+    /// Returns the score of an outcome, if estimates are scored.
+    fn score(&mut self, problem: &Problem<'_>, outcome: &Outcome) -> Option<f64> {
+        let score = self.score.as_mut()?;
+        let mut context = self.workspace.context(problem);
+        Some(score.score(&mut context, &outcome.camera_from_object))
+    }
+
     /// Passes an estimate to the fuser, and remembers the directions that it determines.
     fn fuse(&mut self, estimate: &PoseEstimate) -> Update {
         let update = self.fuser.update(estimate);
+        if update.is_taken() {
+            self.provisional = matches!(update, Update::Provisional(..));
+        }
         if let Some(undetermined) = &mut self.undetermined {
             match update {
                 Update::Accepted(_) => undetermined.fuse(false),
@@ -367,11 +404,8 @@ impl SequentialEstimator {
             return (None, SequentialEvent::NoEstimate(outcome.termination));
         }
         let pose = &outcome.camera_from_object;
+        let mve = self.score(problem, outcome);
         let workspace = &mut self.workspace;
-        let mve = self
-            .score
-            .as_mut()
-            .map(|score| score.score(&mut workspace.context(problem), pose));
         let mut outcome = *outcome;
         let mut open = Matrix6::zeros();
         if let (Some(undetermined), Some(score), Some(mve)) =

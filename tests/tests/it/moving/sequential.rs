@@ -240,6 +240,49 @@ fn a_failed_registration_does_not_drag_the_pose() {
     assert!(error(&mut plain).0 > 0.02);
 }
 
+/// A mask of another object moves the pose away from a good initial one.
+#[test]
+fn a_failed_first_image_does_not_replace_the_initial_pose() {
+    let path = path(Household::Mug, 2, 0.3, 5);
+    let other = Household::Carton.model().expect("valid");
+    let (_, truth, _) = path.frames[0];
+    let aside = Isometry3::translation(0.12, 0.0, 0.0) * truth;
+    let (depth, mask) = render(&other, &camera(), &aside);
+    let wrong = Observation::new(depth, mask, camera()).expect("sizes agree");
+    let init = perturb(&mut rng(6), &truth, 0.005, 0.1);
+    let calibration = Calibration::of(Preset::Local);
+    let mut estimator = SequentialEstimator::calibrated(
+        presets::auto(),
+        FusionMethod::WeightedAverage,
+        &calibration,
+        &path.model,
+        &init,
+    )
+    .expect("valid");
+    let first = estimator.step(&path.model, &wrong, &CameraMotion::none());
+    assert!(
+        matches!(
+            first.event,
+            SequentialEvent::Estimated(Update::Provisional(..))
+        ),
+        "{:?}",
+        first.event
+    );
+    let (observation, truth, motion) = &path.frames[1];
+    let second = estimator.step(&path.model, observation, motion);
+    let (angle, distance) = se3::pose_distance(&second.init, &motion.apply(&init));
+    assert!(angle < 1e-9 && distance < 1e-9, "{second:?}");
+    assert!(
+        matches!(
+            second.event,
+            SequentialEvent::Estimated(Update::Accepted(_))
+        ),
+        "{:?}",
+        second.event
+    );
+    assert!(se3::pose_distance(&second.camera_from_object, truth).1 < 0.002);
+}
+
 #[test]
 fn the_covariance_of_the_registration_reaches_the_fuser() {
     let path = path(Household::Mug, 3, 0.3, 5);
