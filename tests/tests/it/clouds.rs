@@ -166,6 +166,24 @@ fn spheres_have_no_covariance() {
     }
 }
 
+#[test]
+fn a_cloud_of_a_few_points_is_named() {
+    let few = cloud(
+        &(0..5)
+            .map(|i| Point3::new(i as f32, 0.0, 1.0))
+            .collect::<Vec<_>>(),
+    );
+    let many = cloud(&view(Household::Mug, 500, 0.0, 0.0));
+    let found = aligned(Registration::PointToPlane, &few, &many);
+    let text: Vec<_> = found.warnings.iter().map(ToString::to_string).collect();
+    let expected = "usable points, expected 6 or more: do not trust the pose";
+    assert!(
+        text.iter()
+            .any(|w| w.starts_with("source: ") && w.ends_with(expected)),
+        "{text:?}"
+    );
+}
+
 /// Returns the number of directions that a warning calls open, and the axis of their rotations.
 fn open(found: &Alignment) -> Option<(usize, Option<[f64; 3]>)> {
     found.warnings.iter().find_map(|warning| match warning {

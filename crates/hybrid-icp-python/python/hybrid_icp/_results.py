@@ -453,7 +453,10 @@ class Alignment(_Record):
     warnings: list[str]
 
     def __repr__(self) -> str:
-        return f"Alignment({self.outcome}, {self.termination}, fitness {self.fitness:.3f})"
+        text = f"{self.outcome}, {self.termination}, fitness {self.fitness:.3f}"
+        count = len(self.warnings)
+        warned = "" if count == 0 else f", {count} warning{'s' if count > 1 else ''}"
+        return f"Alignment({text}{warned})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -23,7 +23,7 @@ use thiserror::Error;
 
 use self::settled::Settled;
 pub use self::warning::{CloudSide, CloudWarning};
-use self::warning::{extents, is_measured, undetermined, warnings_of};
+use self::warning::{LEAST_POINTS, extents, is_measured, undetermined, warnings_of};
 
 /// Share of the source points with a counterpart below which a warning follows.
 const LITTLE_OVERLAP: f64 = 0.3;
@@ -382,8 +382,8 @@ pub fn align_in<'a>(
     let other_unit = extents(&clouds).filter(|_| fitness < LITTLE_OVERLAP);
     // With few pairs, normals are not to blame.
     let degenerate = outcome.termination == Termination::Degenerate && outcome.n_pairs() == 0;
-    let few = |(_, cloud): &(_, &Cloud)| cloud.surfels().len() < 6;
-    let few_pairs = session.workspace.pairs().len() < 6 || clouds.iter().any(few);
+    let few = |(_, cloud): &(_, &Cloud)| cloud.surfels().len() < LEAST_POINTS;
+    let few_pairs = session.workspace.pairs().len() < LEAST_POINTS || clouds.iter().any(few);
     let by_pairs = other_unit.is_some() || few_pairs;
     let bare = clouds
         .iter()

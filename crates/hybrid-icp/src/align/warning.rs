@@ -11,8 +11,8 @@ use thiserror::Error;
 use crate::warning::Meters;
 
 /// Information of a direction, relative to the best determined one, below which only noise
-/// determines it.
-const UNDETERMINED: f64 = 0.01;
+/// determines it: a multiple of the noise relative to the size of the pairs, within limits.
+const UNDETERMINED: (f64, [f64; 2]) = (0.3, [0.002, 0.01]);
 
 /// Ratio of the extents of two clouds without overlap from which a warning follows: less than that
 /// of meters to centimeters.
@@ -25,6 +25,9 @@ const FINE_METERS: f64 = 1e-6;
 ///
 /// The pose averages over all points, so that it is more accurate than one of them.
 const ROUNDING: f64 = 0.01;
+
+/// Number of points that a pose needs.
+pub(super) const LEAST_POINTS: usize = 6;
 
 /// Largest number of pairs whose surface is examined.
 const MOST_PAIRS: usize = 4000;
@@ -102,6 +105,14 @@ pub enum CloudWarning {
     Unsupported {
         /// Name of the part.
         part: &'static str,
+    },
+    /// A cloud has fewer points than a pose needs, without those that were skipped.
+    #[error("{side}: {count} usable points, expected 6 or more: do not trust the pose")]
+    FewPoints {
+        /// The cloud.
+        side: CloudSide,
+        /// Number of points.
+        count: usize,
     },
     /// The limit of iterations ended the registration, perhaps before it converged.
     #[error(
@@ -214,7 +225,9 @@ pub(super) fn undetermined(
     neighbors: usize,
 ) -> Option<CloudWarning> {
     let of_pairs = quality.observability()?;
-    let n_open = |found: &Observability| found.n_degenerate(UNDETERMINED);
+    let (per_noise, [least, most]) = UNDETERMINED;
+    let limit = (per_noise * quality.plane_rmse / of_pairs.length).clamp(least, most);
+    let n_open = |found: &Observability| found.n_degenerate(limit);
     let of_surface = surface(&of_pairs, pairs, neighbors).filter(|_| n_open(&of_pairs) == 0);
     let found = of_surface.unwrap_or(of_pairs);
     let directions = n_open(&found);
@@ -290,11 +303,17 @@ pub(super) fn warnings_of(side: CloudSide, cloud: &Cloud) -> impl Iterator<Item 
     let skipped = (count > 0).then_some(CloudWarning::PointsSkipped { side, count });
     let estimated = cloud.normals_from().filter(|neighbors| *neighbors > 0);
     let estimated = estimated.map(|neighbors| CloudWarning::NormalsEstimated { side, neighbors });
+    let usable = cloud.surfels().len();
+    let few = (usable < LEAST_POINTS).then_some(CloudWarning::FewPoints {
+        side,
+        count: usable,
+    });
     let step = coordinate_step(cloud.surfels().iter().map(|surfel| surfel.point));
     // As if the points were spread over a square.
     #[allow(clippy::cast_precision_loss)] // Counts far below 2⁵³.
     let spacing = extent(cloud) / (cloud.surfels().len() as f64).sqrt();
     let coarse = step > FINE_METERS && step > ROUNDING * spacing;
     let coarse = coarse.then_some(CloudWarning::CoarseCoordinates { side, step });
-    skipped.into_iter().chain(estimated).chain(coarse)
+    let prepared = skipped.into_iter().chain(estimated);
+    prepared.chain(few).chain(coarse)
 }
