@@ -50,7 +50,8 @@ impl Calibration {
             max_mahalanobis_squared: Some(100.0),
             restart_after: Some(3),
             // Typical of an arm: the hand-eye calibration, and the time of an image.
-            camera_error: [0.001, 0.002],
+            camera_error_meters: 0.001,
+            camera_error_radians: 0.002,
         },
     };
 

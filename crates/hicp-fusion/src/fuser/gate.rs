@@ -30,12 +30,13 @@ pub struct Gate {
     /// Then the held estimate is probably the wrong one: it is removed, and the last contradicting
     /// one is the new start. `None` and 0 never restart.
     pub restart_after: Option<usize>,
-    /// Standard deviations of the error of the camera between two images, along and around each of
-    /// its axes: meters and radians.
+    /// Standard deviation of the camera's place between two images, along each of its axes, meters.
     ///
     /// The distance of an estimate allows for it. It does not weigh estimates: for that, give each
     /// [`CameraMotion`] a covariance.
-    pub camera_error: [f64; 2],
+    pub camera_error_meters: f64,
+    /// The same of its rotation, around each of its axes, radians.
+    pub camera_error_radians: f64,
 }
 
 impl Default for Gate {
@@ -46,7 +47,8 @@ impl Default for Gate {
             max_mve: Some(0.4),
             max_mahalanobis_squared: Some(CHI_SQUARED_6_999),
             restart_after: Some(3),
-            camera_error: [0.0; 2],
+            camera_error_meters: 0.0,
+            camera_error_radians: 0.0,
         }
     }
 }
@@ -96,8 +98,14 @@ impl<F: Fuser> Gated<F> {
                 "largest squared Mahalanobis distance",
                 gate.max_mahalanobis_squared,
             ),
-            ("error of the camera, meters", Some(gate.camera_error[0])),
-            ("error of the camera, radians", Some(gate.camera_error[1])),
+            (
+                "error of the camera, meters",
+                Some(gate.camera_error_meters),
+            ),
+            (
+                "error of the camera, radians",
+                Some(gate.camera_error_radians),
+            ),
         ] {
             if let Some(value) = limit.filter(|limit| limit.is_nan() || *limit < 0.0) {
                 return Err(FusionError::Parameter {
@@ -128,10 +136,13 @@ impl<F: Fuser> Gated<F> {
 
     fn distance_failure(&self, estimate: &PoseEstimate, held: &PoseEstimate) -> Option<Failure> {
         let limit = self.gate.max_mahalanobis_squared?;
-        let [meters, radians] = self.gate.camera_error.map(|error| error * error);
-        let variances = Vector6::from_fn(|i, _| if i < 3 { meters } else { radians });
+        let (meters, radians) = (
+            self.gate.camera_error_meters,
+            self.gate.camera_error_radians,
+        );
+        let error = Vector6::from_fn(|i, _| if i < 3 { meters } else { radians });
         let mut held = *held;
-        held.covariance += Matrix6::from_diagonal(&variances);
+        held.covariance += Matrix6::from_diagonal(&error.map(|deviation| deviation * deviation));
         let found = estimate.mahalanobis_squared(&held);
         (found > limit).then_some(Failure::Mahalanobis { found, limit })
     }

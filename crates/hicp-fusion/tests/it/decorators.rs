@@ -192,9 +192,10 @@ fn outliers_that_contradict_each_other_replace_nothing() {
 /// An error of the camera moves and rotates the poses of all objects around it.
 #[test]
 fn a_gate_allows_for_the_error_of_the_camera() {
-    let passes = |camera_error, error: Isometry3<f64>| {
+    let passes = |[meters, radians]: [f64; 2], error: Isometry3<f64>| {
         let mut fuser = average(Gate {
-            camera_error,
+            camera_error_meters: meters,
+            camera_error_radians: radians,
             ..Gate::default()
         });
         let pose = Isometry3::translation(0.0, 0.0, 0.5);
@@ -216,7 +217,7 @@ fn a_gate_allows_for_the_error_of_the_camera() {
 fn a_gate_of_nan_is_refused() {
     for limit in [f64::NAN, -1.0] {
         let camera = Gate {
-            camera_error: [0.0, limit],
+            camera_error_radians: limit,
             ..Gate::default()
         };
         assert!(Gated::new(aware(), camera).is_err());
