@@ -34,8 +34,9 @@ use crate::results;
 /// source_normals, target_normals : array_like, shape (N, 3), float32, optional
 ///     One normal per point, of any length above 0. Points whose normal is zero are skipped, except
 ///     for targets of "point-to-point".
-/// method : {"point-to-plane", "point-to-point", "gicp"}, optional
-///     The error to minimize.
+/// method : {"gicp", "point-to-plane", "point-to-point"}, optional
+///     The error to minimize. "gicp" finds more poses of clouds that overlap in part, and
+///     "point-to-plane" is a little faster.
 /// max_distance : float, optional
 ///     Largest distance of a pair, meters. The default is a tenth of the diameter of the source,
 ///     then a fiftieth.
@@ -49,7 +50,7 @@ use crate::results;
 /// Alignment
 ///     The pose and how well the clouds fit.
 #[pyfunction]
-#[pyo3(signature = (source, target, T_ts = None, *, source_normals = None, target_normals = None, method = "point-to-plane", max_distance = None, voxel = None, neighbors = 20))]
+#[pyo3(signature = (source, target, T_ts = None, *, source_normals = None, target_normals = None, method = "gicp", max_distance = None, voxel = None, neighbors = 20))]
 #[allow(non_snake_case, clippy::too_many_arguments)]
 pub(crate) fn align<'py>(
     py: Python<'py>,

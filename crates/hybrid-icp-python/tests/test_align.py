@@ -53,7 +53,7 @@ def test_hostile_points_keep_the_pose():
         assert np.array_equal(result.T_ts, np.eye(4))
         assert (result.outcome, result.termination) == ("kept_initial", "no_pairs")
         assert result.rmse is None and result.covariance is None and result.warnings
-    assert "may be in another unit" in hi.align(1000 * source, source).warnings[1]
+    assert "may be in another unit" in hi.align(1000 * source, source).warnings[2]
     for arguments, text in [
         ({"method": "icp"}, "no registration is named"),
         ({"voxel": 0.0}, "voxel is 0, expected a finite number above 0, meters"),

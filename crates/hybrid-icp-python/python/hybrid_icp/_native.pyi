@@ -1269,7 +1269,7 @@ class Tracker:
             Camera from object, meters.
         """
 
-def align(source: _Points, target: _Points, T_ts: npt.ArrayLike | None=None, *, source_normals: npt.ArrayLike | None=None, target_normals: npt.ArrayLike | None=None, method: Literal['point-to-plane', 'point-to-point', 'gicp']='point-to-plane', max_distance: float | None=None, voxel: float | None=None, neighbors: int=20) -> Alignment:
+def align(source: _Points, target: _Points, T_ts: npt.ArrayLike | None=None, *, source_normals: npt.ArrayLike | None=None, target_normals: npt.ArrayLike | None=None, method: Literal['point-to-plane', 'point-to-point', 'gicp']='gicp', max_distance: float | None=None, voxel: float | None=None, neighbors: int=20) -> Alignment:
     """Registers two point clouds: finds the pose that moves the source onto the target.
 
     Points that are not finite or at exactly (0, 0, 0) are skipped. Absent normals are estimated if
@@ -1290,8 +1290,9 @@ def align(source: _Points, target: _Points, T_ts: npt.ArrayLike | None=None, *, 
     source_normals, target_normals : array_like, shape (N, 3), float32, optional
         One normal per point, of any length above 0. Points whose normal is zero are skipped, except
         for targets of "point-to-point".
-    method : {"point-to-plane", "point-to-point", "gicp"}, optional
-        The error to minimize.
+    method : {"gicp", "point-to-plane", "point-to-point"}, optional
+        The error to minimize. "gicp" finds more poses of clouds that overlap in part, and
+        "point-to-plane" is a little faster.
     max_distance : float, optional
         Largest distance of a pair, meters. The default is a tenth of the diameter of the source,
         then a fiftieth.

