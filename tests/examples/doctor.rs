@@ -42,7 +42,7 @@ struct Inputs {
 type Injected = (&'static str, &'static str, fn(Inputs) -> Inputs);
 
 #[rustfmt::skip]
-const FAULTS: [Injected; 53] = [
+const FAULTS: [Injected; 54] = [
     ("mesh: mm read as m", "the mesh is 1000 times too large", |i| i.mesh(1e3, false)),
     ("mesh: m read as mm", "the mesh is 1000 times too small", |i| i.mesh(1e-3, false)),
     ("mesh: cm read as m", "the mesh is 100 times too large", |i| i.mesh(1e2, false)),
@@ -89,6 +89,7 @@ const FAULTS: [Injected; 53] = [
         i.intrinsics(|[fx, fy, cx, cy]| [cx, cy, fx, fy])
     }),
     ("camera: cx and cy swapped", INTRINSICS, |i| i.intrinsics(|[fx, fy, cx, cy]| [fx, fy, cy, cx])),
+    ("camera: fx, cx, fy, cy", INTRINSICS, |i| i.intrinsics(|[fx, fy, cx, cy]| [fx, cx, fy, cy])),
     ("camera: focal length ×0.8", FOCAL, |i| i.intrinsics(|[fx, fy, cx, cy]| [0.8 * fx, 0.8 * fy, cx, cy])),
     ("camera: focal length ×1.15", FOCAL, |i| i.intrinsics(|[fx, fy, cx, cy]| [1.15 * fx, 1.15 * fy, cx, cy])),
     ("camera: focal length ×1.5", FOCAL, |i| i.intrinsics(|[fx, fy, cx, cy]| [1.5 * fx, 1.5 * fy, cx, cy])),

@@ -32,6 +32,16 @@ def test_a_fault_is_named_with_its_fix_and_numbers(scene):
     assert repr(diagnosis).startswith("Diagnosis(['translation_scale'")
 
 
+def test_intrinsics_in_the_order_of_a_flat_matrix_are_named(scene):
+    camera = scene.camera
+    fx, fy, cx, cy = camera.fx, camera.fy, camera.cx, camera.cy
+    flat = hi.Camera(fx, cx, fy, cy, camera.width, camera.height)
+    seen = hi.Observation(scene.depth, scene.mask, flat)
+    first = hi.diagnose(scene.model, seen, scene.rough).faults[0]
+    assert first.fault == "intrinsics"
+    assert first.numbers == pytest.approx({"fx": fx, "fy": fy, "cx": cx, "cy": cy})
+
+
 def test_a_fact_has_no_score(scene):
     empty = hi.Observation(scene.observation.image, np.zeros((240, 320), bool), scene.camera)
     diagnosis = hi.diagnose(scene.model, empty, scene.rough)

@@ -191,6 +191,9 @@ impl Fault {
             }
             Self::MaskInverted => "invert the mask",
             Self::MaskTooLarge { .. } => "pass a mask of this object alone",
+            Self::PlaneInMask { share } if share >= 1.0 => {
+                "use the mask of the object, in this image and of this camera"
+            }
             Self::PlaneInMask { .. } => "remove the plane from the mask",
         };
         fix.to_owned()

@@ -133,8 +133,10 @@ fn shifted<'a>(right: i64, down: i64, of: impl Fn() -> Inputs<'a>) -> Option<Cor
     (right.abs().max(down.abs()) >= MIN_SHIFT).then(|| (fault, of()))
 }
 
+/// An object rarely fills most of the image, so an inverted mask is large.
 pub(super) fn mask_inverted<'a>(inputs: &Inputs<'a>) -> Option<Corrected<'a>> {
-    Some((Fault::MaskInverted, inputs.with_mask(|_, _, set| !set)))
+    let is_large = 3 * inputs.n_masked() > inputs.mask.pixels().len();
+    is_large.then(|| (Fault::MaskInverted, inputs.with_mask(|_, _, set| !set)))
 }
 
 /// Keeps the part of the mask that the model explains at the initial pose.

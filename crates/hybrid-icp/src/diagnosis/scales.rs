@@ -140,8 +140,16 @@ pub(super) fn intrinsics<'a>(inputs: &Inputs<'a>) -> Vec<Corrected<'a>> {
         ];
         std::iter::once(scaled).chain((x != y).then_some(cropped))
     });
-    let orders = [[fx, fy, cy, cx], [cx, cy, fx, fy]].into_iter();
-    let orders = orders.filter(|[_, _, cx, cy]| centered(*cx, *cy, [width, height]));
+    let numbers = [fx, fy, cx, cy];
+    let pairs = (0..4).flat_map(|i| (0..4).map(move |j| [i, j]));
+    let centers = pairs.filter(|[i, j]| i != j && [*i, *j] != [2, 3]);
+    let orders = centers.filter_map(|center| {
+        let [cx, cy] = center.map(|i: usize| numbers[i]);
+        let mut others = (0..4).filter(|i| !center.contains(i)).map(|i| numbers[i]);
+        let (fx, fy) = (others.next()?, others.next()?);
+        let is_square = (0.8..1.25).contains(&(fx / fy));
+        (is_square && centered(cx, cy, [width, height])).then_some([fx, fy, cx, cy])
+    });
     let found = corrected.chain(orders).filter_map(|[fx, fy, cx, cy]| {
         let camera = PinholeCamera::new(fx, fy, cx, cy, old.width(), old.height()).ok()?;
         let inputs = Inputs {
