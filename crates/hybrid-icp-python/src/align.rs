@@ -35,7 +35,7 @@ use crate::results;
 ///     One normal per point, of any length above 0. Points whose normal is zero are skipped, except
 ///     for targets of "point-to-point".
 /// method : {"gicp", "point-to-plane", "point-to-point"}, optional
-///     The error to minimize. "gicp" finds more poses of clouds that overlap in part, and
+///     The error to minimize. "gicp" ends at fewer wrong poses without a warning, and
 ///     "point-to-plane" is a little faster.
 /// max_distance : float, optional
 ///     Largest distance of a pair, meters. The default is a tenth of the diameter of the source,

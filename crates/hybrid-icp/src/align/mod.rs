@@ -185,7 +185,7 @@ pub enum Registration {
     PointToPlane,
     /// [`Generalized`] ICP (GICP), plane to plane, with the normals of both.
     ///
-    /// It finds more poses of clouds that overlap in part than [`Registration::PointToPlane`], and
+    /// It ends at fewer wrong poses without a warning than [`Registration::PointToPlane`], and
     /// takes 1.3 times as long.
     #[default]
     Generalized,
