@@ -3,6 +3,7 @@
 mod beyond;
 mod changed;
 mod estimate;
+mod look_alikes;
 mod metrics;
 mod ray_shift;
 mod resolution;

@@ -60,6 +60,11 @@ impl Distinct {
         angles.fold(f64::INFINITY, f64::min).to_degrees()
     }
 
+    /// Returns the diameter of the model, meters.
+    pub(crate) fn diameter(&self) -> f64 {
+        self.diameter
+    }
+
     /// Returns whether two poses differ by more than a tenth of the diameter.
     pub(crate) fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
         self.mssd(a, b) > APART * self.diameter

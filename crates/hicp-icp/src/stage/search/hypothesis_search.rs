@@ -70,7 +70,7 @@ use crate::stage::stage_trait::Stage;
 /// - The local stage, up to four times.
 ///
 /// If the search widens, it costs about three times as much. The near symmetries of a model are
-/// found once, in some 10 ms.
+/// found once, in some 20 ms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HypothesisSearch<S, A, E, F, R, C, D> {
     /// Refines the initial pose, and the pose found.

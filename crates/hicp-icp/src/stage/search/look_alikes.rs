@@ -134,7 +134,7 @@ impl<R: Score, C: Score> LookAlikeCount<R, C> {
     ///
     /// Cost: a projection of 256 points. If the image does not decide among look-alikes, also one
     /// ranking score for each (at most 143), and the score of five poses. The near symmetries of a
-    /// model are found once, in some 10 ms.
+    /// model are found once, in some 20 ms.
     pub fn at(&mut self, context: &mut Context<'_>, camera_from_object: &Isometry3<f64>) -> f64 {
         if self.list(context, camera_from_object, 0.0).is_empty() {
             return 0.0;

@@ -9,5 +9,6 @@ pub(crate) mod near_symmetries;
 pub(crate) mod options;
 pub(crate) mod revolution;
 pub(crate) mod run;
+pub(crate) mod self_match;
 pub(crate) mod shortlist;
 pub(crate) mod turns;

@@ -4,36 +4,25 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use hicp_core::internal::small::eigen3;
-use hicp_core::internal::{VectorLoop, bounds, centroid, vectorized};
 use hicp_core::{
-    Isometry3, Matrix3, Model, Observation, RigidTransform, Surfel, Translation3, TriMesh,
-    UnitQuaternion, UnitVector3, Vector3,
+    Isometry3, Matrix3, Model, Observation, TriMesh, UnitQuaternion, UnitVector3, Vector3,
 };
 
 use crate::stage::search::distinct::Distinct;
 use crate::stage::search::revolution::axis_of;
+use crate::stage::search::self_match::{SAMPLES, SelfMatch, Set};
 
-/// Number of surface samples that are compared, at most 256.
-const SAMPLES: usize = 256;
 /// Number of rotations around an axis.
 const STEPS: usize = 24;
-/// Share of the samples that must lie on the moved surface.
-const LEAST_SHARE: f64 = 0.6;
 /// Largest distance from the moved surface, as a share of the diameter.
 const TOLERANCE: f64 = 0.05;
 /// Smallest MSSD of a motion, as a share of the diameter. Half of that of distinct poses, because
 /// the two poses also differ by their own errors.
 const LEAST_MOTION: f64 = 0.05;
-/// Number of alignments of the moved surface with itself, and the stride of their samples.
-const ALIGNMENTS: usize = 3;
-const STRIDE: usize = 3;
 /// Cosines of the angles by which a principal axis is corrected: 2° to 37°.
 const TILTED: Range<f64> = 0.8..0.9995;
 /// Share of the seen samples that must tell two poses apart.
 const TELLING: f64 = 0.03;
-
-/// A set of samples.
-type Set = [u64; SAMPLES / 64];
 
 /// The motions S, in the object frame, for which the object at `pose` and at `pose · S` look nearly
 /// the same.
@@ -41,13 +30,14 @@ type Set = [u64; SAMPLES / 64];
 /// They are rotations in steps of 15° around the principal axes, also with the axis flipped. The
 /// axis of a mug is that of its body, which the handle would tilt ([`axis_of`]). Each rotation is
 /// shifted such that most of the surface lies on itself: the handle also moves the center of the
-/// object away from the axis. Declared symmetries are left out, and so are motions that differ from
-/// another one only by these.
+/// object away from the axis. Then the motion is registered with the surface, because a knob tilts
+/// the axes, and a score tells half a turn around a tilted axis from the exact one. Declared
+/// symmetries are left out, and so are motions that differ from another one only by these.
 ///
-/// Computed once per model, in some 10 ms.
+/// Computed once per model, in some 20 ms.
 #[derive(Debug)]
 pub(crate) struct NearSymmetries {
-    samples: Vec<Surfel>,
+    surface: SelfMatch,
     oriented: bool,
     /// The motions, with the samples that are far from the moved surface.
     motions: Vec<(Isometry3<f64>, Set)>,
@@ -103,7 +93,7 @@ impl NearSymmetries {
     fn seen(&self, observation: &Observation, pose: &Isometry3<f64>, tolerance: f64) -> Set {
         let camera = observation.camera();
         let mut seen = Set::default();
-        for (index, sample) in self.samples.iter().enumerate() {
+        for (index, sample) in self.surface.samples().iter().enumerate() {
             let point = pose * sample.point.cast::<f64>();
             let normal = pose.rotation * sample.normal.cast::<f64>();
             if self.oriented && normal.dot(&point.coords) >= 0.0 {
@@ -122,26 +112,22 @@ impl NearSymmetries {
     }
 
     fn find(model: &Model) -> Self {
-        let step = model.samples().len().div_ceil(SAMPLES).max(1);
-        let samples: Vec<Surfel> = model.samples().iter().step_by(step).copied().collect();
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of samples.
         let tolerance = (TOLERANCE * model.diameter()) as f32;
-        let distinct = Distinct::of(model);
-        let mut motions: Vec<(Isometry3<f64>, Set)> = Vec::new();
-        let identity = Isometry3::identity();
+        let surface = SelfMatch::new(model.samples(), tolerance);
         let mut axes = principal_axes(model.mesh());
         if let Some(axis) = axis_of(model.samples(), model.diameter()) {
             align_axes(&mut axes, &axis);
         }
-        let rotations = rotations(&axes);
-        let columns = Columns::new(&samples);
+        let distinct = Distinct::of(model);
+        let mut found = Vec::new();
         let (mut spins, mut aligned) = (Vec::new(), 0);
-        for (index, rotation) in rotations.iter().enumerate() {
+        for (index, rotation) in rotations(&axes).iter().enumerate() {
             let step = index % STEPS;
             if step == 0 {
                 aligned = 0;
             }
-            let Some(motion) = align(&samples, &columns, rotation, tolerance) else {
+            let Some(motion) = surface.shifted(rotation) else {
                 continue;
             };
             aligned += 1;
@@ -150,27 +136,45 @@ impl NearSymmetries {
                 let axis = axes.column(index / (2 * STEPS)).into_owned();
                 spins.push(UnitVector3::new_normalize(axis));
             }
-            let mut known = motions.iter().map(|(motion, _)| motion);
-            let still = distinct.mssd(&motion, &identity) < LEAST_MOTION * model.diameter();
-            if still || known.any(|m| !distinct.apart(&motion, m)) {
-                continue;
-            }
-            let back: Isometry3<f32> = motion.inverse().cast();
-            let mut bare = Set::default();
-            for (index, sample) in samples.iter().enumerate() {
-                let point = (back * sample.point).coords;
-                if columns.nearest(&point, None, 3.0 * tolerance).is_none() {
-                    bare[index / 64] |= 1 << (index % 64);
-                }
-            }
-            motions.push((motion, bare));
+            insert(&mut found, &distinct, (surface.distance(&motion), motion));
         }
+        let mut exact = Vec::new();
+        for (distance, motion) in found {
+            let registered = surface.registered(&motion);
+            let registered = registered.map(|motion| (surface.distance(&motion), motion));
+            let better = registered.filter(|(own, _)| *own < distance);
+            insert(&mut exact, &distinct, better.unwrap_or((distance, motion)));
+        }
+        let motions = exact
+            .iter()
+            .map(|(_, motion)| (*motion, surface.bare(motion)));
         Self {
-            samples,
+            motions: motions.collect(),
+            surface,
             oriented: model.mesh().is_closed(),
-            motions,
             spins,
         }
+    }
+}
+
+/// Inserts a motion with its distance from the surface, unless it is a declared symmetry or too
+/// near another motion.
+///
+/// A motion replaces those that are too near if its distance is less than half of theirs. Around
+/// the axis of a can, all distances are about the same, and replacing would leave a gap.
+fn insert(
+    motions: &mut Vec<(f32, Isometry3<f64>)>,
+    distinct: &Distinct,
+    (distance, motion): (f32, Isometry3<f64>),
+) {
+    if distinct.mssd(&motion, &Isometry3::identity()) < LEAST_MOTION * distinct.diameter() {
+        return;
+    }
+    let near = |other: &Isometry3<f64>| !distinct.apart(&motion, other);
+    let stays = |other: &(f32, _)| other.0 <= 2.0 * distance && near(&other.1);
+    if !motions.iter().any(stays) {
+        motions.retain(|(_, other)| !near(other));
+        motions.push((distance, motion));
     }
 }
 
@@ -224,153 +228,4 @@ fn rotations(axes: &Matrix3<f64>) -> Vec<UnitQuaternion<f64>> {
         }
     }
     rotations
-}
-
-/// Shifts the rotated samples such that most of them lie on the samples.
-///
-/// Returns `None` if too few do.
-fn align(
-    samples: &[Surfel],
-    columns: &Columns,
-    rotation: &UnitQuaternion<f64>,
-    tolerance: f32,
-) -> Option<Isometry3<f64>> {
-    let center = centroid(samples)?;
-    let mut shift = (center - rotation * center).cast::<f32>();
-    let turn = RigidTransform::new(&Isometry3::from_parts(Translation3::identity(), *rotation));
-    for alignment in 0..ALIGNMENTS {
-        let (mut sum, mut near) = (Vector3::<f32>::zeros(), 0_usize);
-        for sample in samples.iter().step_by(STRIDE) {
-            let mut moved = turn.surfel(sample);
-            moved.point += shift;
-            if let Some(residual) = residual(&moved, (samples, columns), tolerance) {
-                sum += residual;
-                near += 1;
-            }
-        }
-        let share = (near * STRIDE) as f64 / samples.len().max(1) as f64;
-        let last = alignment + 1 == ALIGNMENTS;
-        if share < if last { LEAST_SHARE } else { 0.6 * LEAST_SHARE } {
-            return None;
-        }
-        // A shift moves surfaces along their normals by a third of it on average.
-        shift += sum * (2.0 / near as f32);
-    }
-    let shift = shift.cast::<f64>();
-    Some(Isometry3::from_parts(shift.into(), *rotation))
-}
-
-/// Returns the step from a moved sample to the surface, along the normal.
-///
-/// Returns `None` if no surface of similar normal is near.
-fn residual(
-    moved: &Surfel,
-    (samples, columns): (&[Surfel], &Columns),
-    tolerance: f32,
-) -> Option<Vector3<f32>> {
-    let nearest = columns.nearest(&moved.point.coords, Some(&moved.normal), 3.0 * tolerance)?;
-    let nearest = &samples[nearest];
-    // Samples do not lie on samples, so only the distance along the normal counts.
-    let along = nearest.normal.dot(&(nearest.point - moved.point));
-    (along.abs() < tolerance).then(|| *nearest.normal * along)
-}
-
-/// The coordinates of the samples and of their normals, for whole vectors. Those that are missing
-/// are infinitely far away.
-struct Columns {
-    numbers: [[f32; SAMPLES]; 6],
-    /// The coordinate by which the samples are sorted.
-    axis: usize,
-    /// The index of each sample.
-    samples: Vec<usize>,
-}
-
-impl Columns {
-    fn new(samples: &[Surfel]) -> Self {
-        let bounds = bounds(samples.iter().map(|sample| sample.point));
-        let axis = bounds.map_or(0, |[low, high]| (high - low).imax());
-        let mut order: Vec<usize> = (0..samples.len()).collect();
-        order.sort_by(|a, b| samples[*a].point[axis].total_cmp(&samples[*b].point[axis]));
-        let mut numbers = [[f32::INFINITY; SAMPLES]; 6];
-        for (place, index) in order.iter().enumerate() {
-            let sample = &samples[*index];
-            for axis in 0..3 {
-                numbers[axis][place] = sample.point[axis];
-                numbers[3 + axis][place] = sample.normal[axis];
-            }
-        }
-        Self {
-            numbers,
-            axis,
-            samples: order,
-        }
-    }
-
-    /// Returns the nearest sample within a distance, of a similar normal if one is given.
-    fn nearest(
-        &self,
-        point: &Vector3<f32>,
-        normal: Option<&Vector3<f32>>,
-        radius: f32,
-    ) -> Option<usize> {
-        // Without a normal, every one is similar.
-        let (normal, least) = normal.map_or((Vector3::zeros(), -1.0), |normal| (*normal, 0.5));
-        let sorted = &self.numbers[self.axis];
-        let [first, end] = [-SLAB, SLAB]
-            .map(|slab| sorted.partition_point(|x| *x < point[self.axis] + slab * radius));
-        let place = vectorized(Nearest {
-            columns: &self.numbers,
-            blocks: first / LANES..end.div_ceil(LANES),
-            point: *point,
-            normal,
-            least,
-            limit: radius * radius,
-        });
-        place.map(|place| self.samples[place])
-    }
-}
-
-/// Half the width of the slab that is searched, in radii. Roundings are far smaller.
-const SLAB: f32 = 1.01;
-
-/// Number of samples compared at once.
-const LANES: usize = 16;
-
-/// The loop that finds the nearest sample.
-struct Nearest<'a> {
-    columns: &'a [[f32; SAMPLES]; 6],
-    /// The blocks of [`LANES`] samples that are compared.
-    blocks: Range<usize>,
-    point: Vector3<f32>,
-    normal: Vector3<f32>,
-    /// The cosine above which normals are similar.
-    least: f32,
-    /// The square of the largest distance.
-    limit: f32,
-}
-
-impl VectorLoop for Nearest<'_> {
-    type Output = Option<usize>;
-
-    #[inline(always)]
-    fn run(self) -> Option<usize> {
-        let (point, normal) = (&self.point, &self.normal);
-        let (mut least, mut blocks) = ([self.limit; LANES], [0_u32; LANES]);
-        for (number, block) in (1..).zip(self.blocks.clone()) {
-            let columns = self.columns.each_ref();
-            let [x, y, z, nx, ny, nz] = columns.map(|column| &column.as_chunks::<LANES>().0[block]);
-            for lane in 0..LANES {
-                let (dx, dy, dz) = (x[lane] - point.x, y[lane] - point.y, z[lane] - point.z);
-                let along = nx[lane] * normal.x + ny[lane] * normal.y + nz[lane] * normal.z;
-                let distance = dx * dx + dy * dy + dz * dz;
-                let nearer = (along > self.least) & (distance < least[lane]);
-                least[lane] = if nearer { distance } else { least[lane] };
-                blocks[lane] = if nearer { number } else { blocks[lane] };
-            }
-        }
-        let lanes = 0..LANES;
-        let lane = lanes.reduce(|a, b| if least[b] < least[a] { b } else { a })?;
-        let block = (blocks[lane] as usize).checked_sub(1)?;
-        Some((self.blocks.start + block) * LANES + lane)
-    }
 }
