@@ -80,6 +80,7 @@ def test_the_python_blocks_of_the_book_run(page, tmp_path, monkeypatch):
         "T_co": frame.rough, "T_co_N44": np.stack([frame.rough] * 2), "model": frame.model,
         "grasp": lambda pose: None, "T_ts": np.eye(4),
         "frames": [(frame.observation, np.eye(4))] * 2, "T_bc": np.eye(4),
+        "cameras": [(frame.observation, np.eye(4))] * 2,
         "source_points": vertices / 1000, "target_points": vertices / 1000 + 0.001,
     }
     blocks = (FOLDER.parents[2] / "docs" / page).read_text().split("```python\n")[1:]

@@ -61,8 +61,9 @@ impl PyPoseEstimate {
     ///
     /// The covariance of a result accounts for the noise of its pixels alone. This one has the
     /// factors of `SequentialEstimator(…, covariance="calibrated")`, and a wrong pose with a high
-    /// MVE gets little weight. It leaves out the error of the mesh, which fusion does not average
-    /// out.
+    /// MVE gets little weight. If `result.covariance` is None, as of a can, it is that of a nearly
+    /// unknown pose (0.3 radii, 0.3 rad): use `SequentialEstimator` there. It leaves out the
+    /// error of the mesh, which fusion does not average out.
     ///
     /// Parameters
     /// ----------
