@@ -33,17 +33,19 @@ impl Alternative {
     pub const AMBIGUOUS_GAP: f64 = 0.01;
     /// The gap in the agreement of colors from which on colors tell two poses apart.
     const COLOR_GAP: f64 = 0.15;
+    /// The largest likelihood. Errors of the sensor can lower the score of a wrong pose.
+    const MOST_LIKELY: f64 = 2.0;
 
     /// Returns how likely a pose is right, relative to one whose score is lower by `gap`.
     ///
-    /// It is exp(−gap / [`Self::AMBIGUOUS_GAP`]), and 1 if the gap is negative.
+    /// It is exp(−gap / [`Self::AMBIGUOUS_GAP`]), at most 2.
     #[must_use]
     pub(crate) fn likelihood_of(gap: f64) -> f64 {
-        (-gap.max(0.0) / Self::AMBIGUOUS_GAP).exp()
+        (-gap / Self::AMBIGUOUS_GAP).exp().min(Self::MOST_LIKELY)
     }
 
-    /// Returns how likely the pose is right, relative to the returned one; 0 if colors tell them
-    /// apart.
+    /// Returns how likely the pose is right, relative to the returned one: 1 if both scores are
+    /// equal, at most 2, and 0 if colors tell them apart.
     #[must_use]
     pub fn likelihood(&self) -> f64 {
         if self.is_told_apart() {

@@ -51,10 +51,11 @@ pub struct Refinement {
     pub flatness: Option<Flatness>,
     /// The evidence for and against the returned pose, and how well the mask fits it.
     pub evidence: Evidence,
-    /// The expected number of other poses that look alike and explain the image as well, at most 4.
+    /// The number of other poses that look alike, each weighted by how well it explains the image.
     ///
-    /// A pose counts by its likelihood ([`Alternative::likelihood`]), so the number can be 0.4.
-    /// Declared symmetries do not count.
+    /// A pose that explains it as well counts 1, one that explains it better up to 2, and others
+    /// less ([`Alternative::likelihood`]). Declared symmetries do not count, nor more than four
+    /// poses.
     pub look_alikes: f64,
     /// The best other pose that a search found; `None` without a search or another pose.
     ///

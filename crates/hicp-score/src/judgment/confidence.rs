@@ -18,7 +18,9 @@ const NEAREST: f64 = 0.1;
 /// Largest magnitude of a feature.
 const LIMIT: f64 = 20.0;
 /// The log-odds of a pose near its initial one: an offset and the factor of the network's, then the
-/// same per logarithm of the number of poses. Printed by the example `confidence -- near`.
+/// same per logarithm of the number of poses. Printed by the example `confidence -- near` when no
+/// pose counted more than 1. Hardly any initial pose of that fit is at a look-alike, so the fit
+/// would trust a pose that another one beats.
 const NEAR_ODDS: [f64; 4] = [0.434, 1.091, -0.811, -0.215];
 /// The logarithms of its errors relative to the network's: an offset, and the factor of the
 /// logarithm of the number of poses. First in diameters, then in degrees.

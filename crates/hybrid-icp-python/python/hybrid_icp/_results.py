@@ -243,8 +243,9 @@ class Result(_Record):
     expected_error_degrees : float
         Rotation error to expect, degrees.
     look_alikes : float
-        Number of other poses that look alike and explain the image as well, at most 4. They lower
-        the confidence, less so if the returned pose is near the initial one.
+        Number of other poses that look alike. A pose that explains the image as well counts 1, one
+        that explains it better up to 2, and others less. They lower the confidence, less so if the
+        returned pose is near the initial one.
     mve : float
         Mean VSD estimate of the returned pose: 0 if it explains the image everywhere, 1 if
         nowhere. Imperfect masks raise it for right poses, too; `confidence` does not have this

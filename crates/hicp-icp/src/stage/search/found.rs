@@ -32,7 +32,7 @@ const DOUBT_WEIGHT: f64 = 0.1;
 /// The doubt up to which a pose needs no gain but a clearly lower score.
 const CERTAIN: f64 = 0.02;
 /// The difference of a clearly lower score.
-const CLEAR: f64 = 0.01;
+pub(crate) const CLEAR: f64 = 0.01;
 /// The doubt in every pose: of those without doubt, some percent are wrong.
 pub(crate) const LEAST_DOUBT: f64 = 0.05;
 

@@ -8,7 +8,7 @@ use hicp_score::Score;
 use crate::outcome::{Outcome, Termination, Verdict};
 use crate::session::Session;
 use crate::stage::search::distinct::Distinct;
-use crate::stage::search::found::{Found, FoundPoses, LEAST_DOUBT, Progress};
+use crate::stage::search::found::{CLEAR, Found, FoundPoses, LEAST_DOUBT, Progress};
 use crate::stage::search::hypotheses::Hypotheses;
 use crate::stage::search::look_alikes::{LookAlikes, nearest_to_initial};
 use crate::stage::search::options::{SearchOptions, Start};
@@ -33,8 +33,8 @@ use crate::stage::stage_trait::Stage;
 /// 5. **Look-alikes**: poses at which the model nearly covers the best pose, such as a mug that is
 ///    rotated around its axis, are ranked and refined in the same way. This step also runs if the
 ///    local pose is good, because the score of a rotated mug is good, too. Look-alikes of a good
-///    pose are also kept as they are. If the image shows enough of what tells the two poses apart,
-///    it costs only a projection of 256 points.
+///    pose are listed as they are. If the image shows enough of what tells the two poses apart, it
+///    costs only a projection of 256 points.
 /// 6. **Finish**: the finishing stage fits the two best poses that differ, and up to a half of
 ///    `refined` if all stay doubtful. They are compared by score + doubt / 10, before the fit and
 ///    after it. Then the local stage refines the best one. If the local pose is far from the
@@ -43,8 +43,8 @@ use crate::stage::stage_trait::Stage;
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
 /// [`SearchOptions::far_gain`] if the local pose is far from the initial one. A pose needs no gain
-/// if it is nearly without doubt and clearly better than every other one. A look-alike of the best
-/// pose replaces it if its rotation is nearer to the initial one and its score is at most 0.02
+/// if it is nearly without doubt and clearly better than every other one. A look-alike of any other
+/// best pose replaces it if its rotation is nearer to the initial one and its score is at most 0.02
 /// higher. The initial rotation then decides: that of a can, for example, may be known from another
 /// source. The other poses are in [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
@@ -302,7 +302,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         self.aligned = aligned;
     }
 
-    /// Refines poses that look like the best one found.
+    /// Adds poses that look like the best one found. If that is bad, they are refined first.
     fn try_look_alikes(&mut self, run: &mut Run<'_, '_>, threshold: f64) {
         let Some(best) = self.found.best().copied() else {
             return;
@@ -311,23 +311,24 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         let mut alike = std::mem::take(&mut self.alike);
         let scores = (&mut self.ranking, &mut self.score);
         let listed = alike.list(run, (&best, bad), scores);
-        if !bad {
-            // A look-alike of a pose that fits may fit as it is.
+        if bad {
+            self.aligned.clear();
+            let kept = (run.options.refined, run.options.spacing_degrees);
+            self.align(run, listed.poses(), kept);
+            self.explore(run, false);
+        } else {
+            // A look-alike of a pose that fits may fit as it is, and the finish fits the best one.
             for (score, pose) in listed.poses() {
                 self.found
                     .add(Found::explored(*score, *pose), &run.distinct);
             }
         }
-        self.aligned.clear();
-        let kept = (run.options.refined, run.options.spacing_degrees);
-        self.align(run, listed.poses(), kept);
         self.alike = alike;
-        self.explore(run, false);
     }
 
     /// Returns the pose nearest to the initial one that looks like `best` and explains the image as
-    /// well, if it is another one.
-    fn nearest_alike(&mut self, run: &mut Run<'_, '_>, best: &Found) -> Option<Found> {
+    /// well, up to a gap in score, if it is another one.
+    fn nearest_alike(&mut self, run: &mut Run<'_, '_>, best: &Found, gap: f64) -> Option<Found> {
         let start = nearest_to_initial(run, &best.outcome.camera_from_object)?;
         if run.is_over() || run.score(&mut self.score, &start) > best.score + FINAL_GAP {
             return None;
@@ -336,7 +337,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         let outcome = Outcome::refined(start, Termination::Converged).then(next);
         let pose = outcome.camera_from_object;
         let score = run.score(&mut self.score, &pose);
-        if score > best.score + UNDECIDED || !run.allows(&pose) {
+        if score > best.score + gap || !run.allows(&pose) {
             return None;
         }
         Some(Found {
@@ -444,12 +445,13 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
         let (mut returned, mut score) = (local, from.map_or(f64::INFINITY, |from| from.score));
         let wins = |found: &Found, gain| from.is_none_or(|from| found.beats(&from, gain));
         let best = self.found.cheapest().filter(|best| wins(best, gain));
-        let certain = || from.and_then(|from| self.found.certain(&from));
-        if let Some(best) = best.or_else(certain) {
+        let certain = from.and_then(|from| self.found.certain(&from));
+        if let Some(best) = best.or(certain) {
+            let gap = certain.map_or(UNDECIDED, |_| CLEAR);
             let nearest = if ignored {
                 None
             } else {
-                self.nearest_alike(&mut run, &best)
+                self.nearest_alike(&mut run, &best, gap)
             };
             let best = nearest.filter(|found| wins(found, 0.0)).unwrap_or(best);
             run.report(&best.outcome.camera_from_object, (best.score, score), true);

@@ -49,6 +49,8 @@ impl LookAlikes {
         let gap = if bad { f64::INFINITY } else { MAX_GAP };
         let limit = run.score(ranking, base) + gap;
         let spacing = run.options.spacing_degrees;
+        // Ranks are too rough to drop a look-alike of a good pose for a neighbor.
+        let ranked_spacing = if bad { spacing } else { 0.0 };
         let refined = run.options.refined.min(REFINED);
         for index in near.undecided(observation, base, model.diameter()) {
             if run.is_over() {
@@ -58,7 +60,7 @@ impl LookAlikes {
             if run.allows(&pose) {
                 let score = run.score(ranking, &pose);
                 if score < limit {
-                    self.ranked.insert(score, pose, refined, spacing);
+                    self.ranked.insert(score, pose, refined, ranked_spacing);
                 }
             }
         }
@@ -101,7 +103,7 @@ pub(crate) fn nearest_to_initial(
 ///
 /// Two poses look alike if the model at one nearly covers the model at the other. An example is a
 /// mug that is rotated around its axis while its handle is hidden. At most four look-alikes count.
-/// Each adds exp(−g / 0.01), where g is its score minus that of the given pose, at most 1. Poses
+/// Each adds exp(−g / 0.01), where g is its score minus that of the given pose, at most 2. Poses
 /// within an MSSD of a tenth of the diameter, up to declared symmetries, do not count.
 ///
 /// ```

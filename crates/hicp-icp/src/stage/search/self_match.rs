@@ -10,8 +10,10 @@ use hicp_metric::{Degeneracy, NormalEquations};
 pub(crate) const SAMPLES: usize = 256;
 /// Share of the samples that must lie on the moved surface.
 const LEAST_SHARE: f64 = 0.6;
-/// Number of shifts of a rotated surface, and the stride of their samples.
-const SHIFTS: usize = 3;
+/// Limits of the distances along the normals at each shift of a rotated surface, in tolerances. A
+/// knob moves the center of a box, so the first ones are wide.
+const SHIFTS: [f32; 3] = [3.0, 2.0, 1.0];
+/// The stride of the samples of a shift.
 const STRIDE: usize = 3;
 /// Largest distances of the pairs of a registration, iteration by iteration, in tolerances. Later
 /// ones leave out what differs, such as a knob on one of two sides.
@@ -61,18 +63,18 @@ impl SelfMatch {
         let center = centroid(&self.samples)?;
         let mut shift = (center - rotation * center).cast::<f32>();
         let turn = RigidTransform::new(&Isometry3::from_parts(Translation3::identity(), *rotation));
-        for number in 1..=SHIFTS {
+        for (number, limit) in (1..).zip(SHIFTS) {
             let (mut sum, mut near) = (Vector3::<f32>::zeros(), 0_usize);
             for sample in self.samples.iter().step_by(STRIDE) {
                 let mut moved = turn.surfel(sample);
                 moved.point += shift;
-                if let Some((normal, along)) = self.residual(&moved, self.tolerance) {
+                if let Some((normal, along)) = self.residual(&moved, limit * self.tolerance) {
                     sum += normal * along;
                     near += 1;
                 }
             }
             let share = (near * STRIDE) as f64 / self.samples.len().max(1) as f64;
-            let last = number == SHIFTS;
+            let last = number == SHIFTS.len();
             if share < if last { LEAST_SHARE } else { 0.6 * LEAST_SHARE } {
                 return None;
             }
