@@ -177,7 +177,7 @@ fn warm() -> (Case, Refiner) {
 }
 
 #[library_benchmark]
-#[bench::hybrid_mug(setup = warm, config = limit(21_370_982))]
+#[bench::hybrid_mug(setup = warm, config = limit(22_780_023))]
 fn pipeline(state: (Case, Refiner)) -> (Case, Refiner, Refinement) {
     let (case, mut refiner) = state;
     let refined = refiner.refine(&case.scene.model, &case.scene.observation, &case.init);
