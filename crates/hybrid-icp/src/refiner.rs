@@ -54,8 +54,7 @@ pub struct Refinement {
     /// The number of other poses that look alike, each weighted by how well it explains the image.
     ///
     /// A pose that explains it as well counts 1, one that explains it better up to 2, and others
-    /// less ([`Alternative::likelihood`]). Declared symmetries do not count, nor more than four
-    /// poses.
+    /// less ([`Alternative::likelihood`]). At most four poses count, and no declared symmetries.
     pub look_alikes: f64,
     /// The best other pose that a search found; `None` without a search or another pose.
     ///

@@ -42,11 +42,11 @@ use crate::stage::stage_trait::Stage;
 ///    one by the gain, one fit of another pose is enough, for the list of the others.
 ///
 /// The best pose is returned if it beats the local pose by [`SearchOptions::near_gain`], or by
-/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. A pose needs no gain
-/// if it is nearly without doubt and clearly better than every other one. A look-alike of the best
-/// pose replaces it if its rotation is nearer to the initial one and its score is at most 0.02
-/// higher, or 0.01 if the best pose needed no gain. The initial rotation then decides: that of a
-/// can, for example, may be known from another source. The other poses are in
+/// [`SearchOptions::far_gain`] if the local pose is far from the initial one. A certain pose
+/// needs no gain: it is nearly without doubt and clearly better than every other one. A look-alike
+/// of the best pose replaces it if its rotation is nearer to the initial one and its score is at
+/// most 0.02 higher, or 0.01 if the best pose is certain. The initial rotation then decides: that
+/// of a can, for example, may be known from another source. The other poses are in
 /// [`Workspace::alternatives`](crate::Workspace::alternatives).
 ///
 /// Within another search, it only runs its local stage.
