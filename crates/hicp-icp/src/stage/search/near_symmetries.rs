@@ -6,12 +6,15 @@ use std::sync::Arc;
 use hicp_core::internal::small::eigen3;
 use hicp_core::{
     Isometry3, Matrix3, Model, Observation, TriMesh, UnitQuaternion, UnitVector3, Vector3,
+    sample_surface,
 };
 
 use crate::stage::search::distinct::Distinct;
 use crate::stage::search::revolution::axis_of;
 use crate::stage::search::self_match::{SAMPLES, SelfMatch, Set};
 
+/// Number of samples that are drawn for a model with too few of its own.
+const DRAWN: usize = 1000;
 /// Number of rotations around an axis.
 const STEPS: usize = 24;
 /// Largest distance from the moved surface, as a share of the diameter.
@@ -114,9 +117,12 @@ impl NearSymmetries {
     fn find(model: &Model) -> Self {
         #[allow(clippy::cast_possible_truncation)] // f32 is the precision of samples.
         let tolerance = (TOLERANCE * model.diameter()) as f32;
-        let surface = SelfMatch::new(model.samples(), tolerance);
+        let few = model.samples().len() < SAMPLES;
+        let drawn = few.then(|| sample_surface(model.mesh(), DRAWN));
+        let samples = drawn.as_deref().unwrap_or(model.samples());
+        let surface = SelfMatch::new(samples, tolerance);
         let mut axes = principal_axes(model.mesh());
-        if let Some(axis) = axis_of(model.samples(), model.diameter()) {
+        if let Some(axis) = axis_of(samples, model.diameter()) {
             align_axes(&mut axes, &axis);
         }
         let distinct = Distinct::of(model);
