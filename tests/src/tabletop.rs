@@ -14,8 +14,12 @@ use rand::RngExt;
 
 use crate::camera;
 
-/// Fewest visible pixels of an object that is a case.
-const LEAST_PIXELS: usize = 1000;
+/// Fewest visible pixels of an object that is a case, of an image of 640×480 pixels.
+const LEAST_PIXELS: f64 = 1000.0;
+/// The same of an image of any size.
+const FEWEST_PIXELS: f64 = 100.0;
+/// The sizes of [`Tabletop::resized`], as powers of two of 640×480 pixels.
+const SIZES: std::ops::Range<f64> = -3.0..1.5;
 /// Smallest visible share of an object that is a case.
 const LEAST_VISIBLE: f64 = 0.3;
 /// Objects in a scene.
@@ -72,6 +76,18 @@ impl MaskKind {
         }
     }
 
+    /// Returns the same defect for images of another size; at least a pixel remains.
+    #[must_use]
+    fn scaled(self, factor: f64) -> Self {
+        let scale = |pixels: u32| ((f64::from(pixels) * factor).round() as u32).max(1);
+        match self {
+            Self::Dilated(pixels) => Self::Dilated(scale(pixels)),
+            Self::Eroded(pixels) => Self::Eroded(scale(pixels)),
+            Self::Ragged(pixels) => Self::Ragged(scale(pixels)),
+            other => other,
+        }
+    }
+
     /// Returns a mask with this defect.
     ///
     /// # Errors
@@ -102,7 +118,7 @@ pub struct Tabletop {
     /// The models, with their names.
     pub objects: Vec<(String, Model)>,
     models: Vec<Model>,
-    camera: PinholeCamera,
+    resized: bool,
 }
 
 /// An object in a noisy image, before segmentation.
@@ -139,8 +155,37 @@ impl Tabletop {
         Self {
             models: objects.iter().map(|(_, model)| model.clone()).collect(),
             objects,
-            camera: camera(),
+            resized: false,
         }
+    }
+
+    /// Returns the scenes in images of 80×60 to about 1,800×1,360 pixels, each of another size.
+    ///
+    /// The objects have at least 100 pixels, and the defects of masks grow with the image.
+    #[must_use]
+    pub fn resized(self) -> Self {
+        Self {
+            resized: true,
+            ..self
+        }
+    }
+
+    fn camera(&self, seed: u64) -> PinholeCamera {
+        let full = camera();
+        if !self.resized {
+            return full;
+        }
+        let mut random = stream(seed, &["size"], 0);
+        let scale = random.random_range(SIZES).exp2();
+        let [fx, fy, width, height] = [
+            full.fx(),
+            full.fy(),
+            f64::from(full.width()),
+            f64::from(full.height()),
+        ]
+        .map(|length| length * scale);
+        let [cx, cy] = [full.cx(), full.cy()].map(|center| (center + 0.5) * scale - 0.5);
+        PinholeCamera::new(fx, fy, cx, cy, width as u32, height as u32).expect("a valid camera")
     }
 
     /// Returns the visible objects of a scene: five on a table, with noise of 0 to 3 %.
@@ -182,8 +227,11 @@ impl Tabletop {
     ) -> Result<Vec<Seen>, SimError> {
         let mut random = stream(seed, &["tabletop"], 0);
         let clutter = Clutter::draw(&mut random, &self.models, OBJECTS)?;
+        let camera = self.camera(seed);
+        let scale = scale_of(&camera);
+        let least = (LEAST_PIXELS * scale * scale).max(FEWEST_PIXELS) as usize;
         let perfect = DepthSensor::default();
-        let view = clutter.view(&mut random, &self.models, &self.camera, &perfect)?;
+        let view = clutter.view(&mut random, &self.models, &camera, &perfect)?;
         let sensor = sensor(&mut random);
         let mut seen = Vec::new();
         for (index, object) in (0..).zip(&view.instances) {
@@ -195,7 +243,7 @@ impl Tabletop {
                 object: self.objects[object.model].0.clone(),
                 seed,
                 index,
-                camera: self.camera,
+                camera,
                 camera_from_object: object.camera_from_object,
                 init: object.camera_from_object,
                 bin: None,
@@ -204,7 +252,7 @@ impl Tabletop {
                 depth: view.depth.clone(),
                 mask: object.visible.clone(),
             };
-            if case.mask.n_set() < LEAST_PIXELS {
+            if case.mask.n_set() < least {
                 continue;
             }
             let corruption = Corruption {
@@ -214,7 +262,7 @@ impl Tabletop {
             };
             let (depth, visible) = corruption.apply(&case)?;
             let visible_share = visible.n_set() as f64 / object.silhouette.n_set() as f64;
-            if visible.n_set() < LEAST_PIXELS || visible_share < LEAST_VISIBLE {
+            if visible.n_set() < least || visible_share < LEAST_VISIBLE {
                 continue;
             }
             seen.push(Seen {
@@ -224,7 +272,7 @@ impl Tabletop {
                 visible,
                 visible_share,
                 sensor,
-                camera: self.camera,
+                camera,
             });
         }
         Ok(seen)
@@ -258,7 +306,7 @@ impl Seen {
     ///
     /// Never with the sizes of a scene.
     pub fn observe(&self, kind: MaskKind) -> Result<Observation, SimError> {
-        let mask = kind.apply(&self.visible)?;
+        let mask = kind.scaled(scale_of(&self.camera)).apply(&self.visible)?;
         Ok(Observation::new(
             Arc::clone(&self.depth),
             mask,
@@ -304,6 +352,11 @@ impl Seen {
         let center = self.truth * own.center();
         Isometry3::from_parts((center - turn * model.center()).into(), turn)
     }
+}
+
+/// Returns the size of the image relative to 640×480 pixels.
+fn scale_of(camera: &PinholeCamera) -> f64 {
+    camera.fx() / crate::camera().fx()
 }
 
 /// A sensor with independent noise, percent of the depth.

@@ -164,8 +164,12 @@ impl Objects {
 pub enum Images {
     /// White noise.
     Noisy,
+    /// The same in images of any size.
+    Resized,
     /// Systematic errors of the sensor, and a model that is not quite that of the object.
     Distorted,
+    /// The same in images of any size.
+    ResizedDistorted,
     /// White noise, and nothing measured outside of the mask.
     Cropped,
 }
@@ -182,14 +186,18 @@ pub fn simulate(
     seed: u64,
     count: usize,
 ) -> Result<Vec<Case>, Box<dyn Error>> {
-    let all = objects.scenes((1.0, 1.0))?;
+    let distorted = matches!(images, Images::Distorted | Images::ResizedDistorted);
+    let mut all = objects.scenes((1.0, 1.0))?;
+    if matches!(images, Images::Resized | Images::ResizedDistorted) {
+        all = all.into_iter().map(Tabletop::resized).collect();
+    }
     let all_rough = objects.scenes(ROUGH)?;
     let all_alike = objects.scenes((1.12, 0.92))?;
     let mut refiners = PRESETS.map(Refiner::preset);
     let mut cases = Vec::new();
     let models = all.iter().zip(&all_rough).zip(&all_alike);
     for (scene, ((exact, rough), alike)) in (seed..).zip(models.cycle()) {
-        let (scenes, visible) = if images == Images::Distorted {
+        let (scenes, visible) = if distorted {
             (rough, exact.distorted_scene(scene)?)
         } else {
             (exact, exact.scene(scene)?)

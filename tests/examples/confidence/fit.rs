@@ -24,7 +24,7 @@ const STEPS: i32 = 2000;
 const STEP: f64 = 0.02;
 /// Seed of the initial parameters. Of the seeds 0 to 3, this one leads to the lowest calibration
 /// errors on other cases of tuning objects.
-const SEED: u64 = 2;
+const SEED: u64 = 1;
 
 type Parameters = [f64; PARAMETERS];
 

@@ -3,10 +3,12 @@
 //! Run `cargo run --release -p hicp-tests --example confidence [CASES]` for the report on the test
 //! objects. With `-- fit [CASES]`, it prints the network, fitted on tuning and invented objects: so
 //! many cases with white noise, as many with systematic errors of sensor and model, and half as
-//! many with no measurement outside of the mask. With `-- near [CASES]`, it prints the constants
-//! for poses near the initial one, fitted on such cases to the results of the network. With `--
-//! tuning [CASES]` or `-- distorted [CASES]`, it reports on other cases of tuning objects, and with
-//! `-- cropped [CASES]` on test objects in images with no measurement outside of the mask.
+//! many of three other kinds: no measurement outside of the mask, and both errors in images of any
+//! size. With `-- near [CASES]`, it prints the constants for poses near the initial one, fitted on
+//! such cases to the results of the network. With `-- tuning [CASES]` or `-- distorted [CASES]`, it
+//! reports on other cases of tuning objects. With `-- cropped [CASES]`, it reports on test objects
+//! in images with no measurement outside of the mask, and with `-- resized [CASES]` or `--
+//! resized-distorted [CASES]` in images of any size.
 
 mod cases;
 mod fit;
@@ -32,6 +34,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 (Images::Noisy, count),
                 (Images::Distorted, count),
                 (Images::Cropped, count / 2),
+                (Images::Resized, count / 2),
+                (Images::ResizedDistorted, count / 2),
             ];
             let simulate = |(set, (images, count))| {
                 let cases = cases::simulate(&Objects::ForFit(set), images, 0, count);
@@ -61,9 +65,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             };
             report(&cases::simulate(&objects, images, 1 << 20, count)?);
         }
-        Some("cropped") => {
+        Some(name @ ("cropped" | "resized" | "resized-distorted")) => {
             let objects = Objects::Household(&Household::TEST);
-            report(&cases::simulate(&objects, Images::Cropped, 0, count)?);
+            let images = match name {
+                "cropped" => Images::Cropped,
+                "resized" => Images::Resized,
+                _ => Images::ResizedDistorted,
+            };
+            report(&cases::simulate(&objects, images, 0, count)?);
         }
         _ => {
             let objects = Objects::Household(&Household::TEST);

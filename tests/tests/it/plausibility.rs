@@ -1,7 +1,8 @@
 //! Warnings about inputs, and the confidence in poses that wrong inputs make plausible.
 
-use hicp_sim::{Household, rng};
-use hicp_tests::render;
+use hicp_sim::{Household, rng, stream};
+use hicp_tests::tabletop::{MaskKind, Tabletop};
+use hicp_tests::{points_of, render};
 use hybrid_icp::checks::{ACCEPTED, warnings, warnings_of_model};
 use hybrid_icp::core::nalgebra::{Quaternion, UnitQuaternion};
 use hybrid_icp::core::{
@@ -143,4 +144,33 @@ fn a_pose_that_is_not_rigid_causes_a_warning() {
         init.rotation = UnitQuaternion::new_unchecked(Quaternion::new(length, 0.0, 0.0, 0.0));
         assert!(behind(&init), "{length}");
     }
+}
+
+/// An object of some hundred pixels is less evidence, but its right poses are accepted.
+#[test]
+fn right_poses_in_small_images_are_accepted() {
+    let scenes = Tabletop::new(&Household::TEST).unwrap().resized();
+    let points = points_of(&scenes);
+    let mut refiner = Refiner::preset(Preset::Auto);
+    let (mut right, mut accepted, mut wrong) = (0, 0, 0);
+    for seed in 0..120 {
+        for (seen, place) in scenes.scene(seed).unwrap().into_iter().zip(0..) {
+            if seen.camera.width() > 200 || seen.noise_percent() > 1.5 {
+                continue;
+            }
+            let observation = seen.observe(MaskKind::Soft).unwrap();
+            let init = seen.near(&mut stream(seed, &["small"], place), 1.0);
+            let model = &scenes.objects[seen.model].1;
+            let refined = refiner.refine(model, &observation, &init);
+            let error = points[seen.model].mssd(&refined.outcome.camera_from_object, &seen.truth);
+            let sure = u32::from(refined.confidence > ACCEPTED);
+            if error < 0.1 * model.diameter() {
+                (right, accepted) = (right + 1, accepted + sure);
+            } else {
+                wrong += sure;
+            }
+        }
+    }
+    let counts = format!("{accepted} of {right} right poses, {wrong} wrong ones");
+    assert!(10 * accepted >= 7 * right && 50 * wrong <= accepted, "{counts}");
 }

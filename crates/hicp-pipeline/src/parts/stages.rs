@@ -275,7 +275,12 @@ fn search_options(p: &mut Parameters<'_>) -> Result<SearchOptions, PipelineError
             0.001,
             "the same if the local pose is far from the initial one",
         )?,
-        good_enough: p.number("good_enough", FACTOR, 0.005, "doubt that ends it")?,
+        good_enough: p.number(
+            "good_enough",
+            FACTOR,
+            0.02,
+            "doubt that ends it, unless poses look alike",
+        )?,
         near_gain: p.number("near_gain", FACTOR, 0.1, near)?,
         far_gain: p.number("far_gain", FACTOR, 0.04, far)?,
         rotations: p.word("rotations", &rotations, tried)?,

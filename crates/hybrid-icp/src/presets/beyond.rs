@@ -213,7 +213,7 @@ pub(crate) fn far() -> Far {
 /// 1. **Fit**: up to eight iterations pair the rendered model with the image, by the depth along
 ///    the rays ([`RenderedSurface`], differences up to 0.12 diameters) and across the silhouette
 ///    ([`Contour`]). Rotations with little information are frozen, unless they explain the
-///    residuals. If the [`Doubt`] is then below 0.1, the pipeline ends.
+///    residuals. If the [`Doubt`] is then below 0.05, the pipeline ends.
 /// 2. **Wide fit**: differences up to 0.25 diameters count, and rotations with little information
 ///    stay frozen, also in later fits.
 /// 3. **Steps**: [`SwitchUntilStall`] runs up to six steps until the score stalls, and keeps the
@@ -242,7 +242,7 @@ pub fn local() -> Local {
         Switch {
             switcher: Threshold {
                 score: Doubt,
-                alpha: 0.1,
+                alpha: 0.05,
             },
             aligned: Cascade(()),
             misaligned: Cascade((guarded(wide_fit()), steps)),

@@ -10,7 +10,7 @@ use crate::session::Session;
 use crate::stage::search::distinct::Distinct;
 use crate::stage::search::found::{CLEAR, Found, FoundPoses, LEAST_DOUBT, Progress};
 use crate::stage::search::hypotheses::Hypotheses;
-use crate::stage::search::look_alikes::{LookAlikes, nearest_to_initial};
+use crate::stage::search::look_alikes::{LookAlikes, is_unique, nearest_to_initial};
 use crate::stage::search::options::{SearchOptions, Start};
 use crate::stage::search::run::{Clock, Run};
 use crate::stage::search::shortlist::Shortlist;
@@ -25,7 +25,8 @@ use crate::stage::stage_trait::Stage;
 ///    differ are kept. If the local pose is near the initial one, a hypothesis must win by more, so
 ///    only a quarter of the best are aligned and refined.
 /// 3. **Try**: the finishing stage fits the best of the first 32. If that is good enough, the
-///    others are not aligned, and nothing is explored.
+///    others are not aligned, and nothing is explored. A pose that other poses may look like must
+///    also have a score of at most 0.005.
 /// 4. **Explore**: a stage that costs some hundred scores refines each. If the best pose is still
 ///    bad, and the local pose is far from the initial one, [`SearchOptions::widens`] repeats steps
 ///    2 and 4 for all ranked hypotheses. Twice as many are then refined, and they differ by half as
@@ -194,7 +195,7 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
 
     /// Returns whether no further poses are needed.
     fn is_good(&mut self, run: &mut Run<'_, '_>) -> bool {
-        self.doubt(run) <= run.options.good_enough && !self.is_bad(run, UNEXPLAINED)
+        !self.is_bad(run, UNEXPLAINED) && self.found.best().is_some_and(|best| ends(run, best))
     }
 
     /// Ranks hypotheses from the whole range into the list of the best, within the time limit.
@@ -360,8 +361,8 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
             false => (1, 0),
         };
         for finalist in 0..fits {
-            let good = |best: Found| best.doubt() <= run.options.good_enough;
-            let enough = finalist >= FINALISTS && self.found.cheapest().is_some_and(good);
+            let cheapest = self.found.cheapest();
+            let enough = finalist >= FINALISTS && cheapest.is_some_and(|best| ends(run, &best));
             if enough || run.is_over_after(finalist) {
                 break;
             }
@@ -476,10 +477,21 @@ impl<S: Stage, A: Stage, E: Stage, F: Stage, R: Score, C: Score, D: Score>
     }
 }
 
+/// Returns whether a pose has so little doubt that no other one is needed.
+///
+/// The doubt does not know of poses that look alike. So the image must decide among them, unless
+/// none can explain it clearly better.
+fn ends(run: &Run<'_, '_>, best: &Found) -> bool {
+    best.doubt() <= run.options.good_enough
+        && (best.score <= EXPLAINED || is_unique(run, &best.outcome.camera_from_object))
+}
+
 /// Number of best ranked hypotheses that are aligned before the best of them is tried.
 const FIRST: usize = 32;
 /// Product of doubt and score above which even a confident pose is not good enough: a score of .04.
 const UNEXPLAINED: f64 = 0.002;
+/// Score of a pose that explains so much that no other one is clearly better.
+const EXPLAINED: f64 = 0.005;
 /// Product of doubt and score above which the search of a part of the hypotheses has failed.
 const FAILED: f64 = 0.02;
 /// Number of distinct poses that are fitted, even if one is good enough.

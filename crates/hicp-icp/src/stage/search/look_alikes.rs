@@ -80,6 +80,16 @@ impl LookAlikes {
     }
 }
 
+/// Returns whether the image decides between `pose` and all poses that look like it.
+pub(crate) fn is_unique(run: &Run<'_, '_>, pose: &Isometry3<f64>) -> bool {
+    let Some((model, observation)) = run.problem.sides() else {
+        return true;
+    };
+    let near = NearSymmetries::of(model);
+    let mut undecided = near.undecided(observation, pose, model.diameter());
+    undecided.next().is_none()
+}
+
 /// Returns the pose nearest to the initial one, by its rotation, among those that look like `pose`
 /// and are apart from it.
 ///

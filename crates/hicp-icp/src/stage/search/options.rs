@@ -34,7 +34,8 @@ pub struct SearchOptions {
     pub threshold: f64,
     /// The threshold if the local pose is far from the initial one, or if that is ignored.
     pub far_threshold: f64,
-    /// The doubt at which no further hypotheses are refined, unless the score is above 0.04.
+    /// The doubt at which no further hypotheses are refined, unless the score is above 0.04 or the
+    /// image does not decide among poses that look alike.
     pub good_enough: f64,
     /// The gain by which a hypothesis must beat a local pose near the initial pose.
     ///
@@ -93,7 +94,7 @@ impl Default for SearchOptions {
             start: Start::Refined,
             threshold: 0.002,
             far_threshold: 0.001,
-            good_enough: 0.005,
+            good_enough: 0.02,
             near_gain: 0.1,
             far_gain: 0.04,
             rotations: Rotations::Even,

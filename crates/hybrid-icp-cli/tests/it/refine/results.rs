@@ -205,7 +205,7 @@ fn other_poses_that_a_search_finds_are_written() {
         .with("--alternatives", "others.json")
         .with("--pipeline", "always.toml");
     let always = hybrid_icp::Preset::Search.toml();
-    let limit = "good_enough = 0.005\n";
+    let limit = "good_enough = 0.02\n";
     let always = always.replace(limit, "good_enough = 0.0\nstart = \"ignored\"\n");
     scene.write("always.toml", always);
     scene.run().exits(0);
