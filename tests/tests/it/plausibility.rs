@@ -172,5 +172,8 @@ fn right_poses_in_small_images_are_accepted() {
         }
     }
     let counts = format!("{accepted} of {right} right poses, {wrong} wrong ones");
-    assert!(10 * accepted >= 7 * right && 50 * wrong <= accepted, "{counts}");
+    assert!(
+        10 * accepted >= 7 * right && 50 * wrong <= accepted,
+        "{counts}"
+    );
 }
