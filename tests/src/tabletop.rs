@@ -76,8 +76,7 @@ impl MaskKind {
         }
     }
 
-    /// Returns the same defect for images of another size; at least a pixel remains.
-    #[must_use]
+    /// Returns the same defect for images of another size, of one pixel at least.
     fn scaled(self, factor: f64) -> Self {
         let scale = |pixels: u32| ((f64::from(pixels) * factor).round() as u32).max(1);
         match self {
@@ -170,6 +169,7 @@ impl Tabletop {
         }
     }
 
+    /// Returns the camera of a scene.
     fn camera(&self, seed: u64) -> PinholeCamera {
         let full = camera();
         if !self.resized {

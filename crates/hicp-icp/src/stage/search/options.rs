@@ -34,8 +34,8 @@ pub struct SearchOptions {
     pub threshold: f64,
     /// The threshold if the local pose is far from the initial one, or if that is ignored.
     pub far_threshold: f64,
-    /// The doubt at which no further hypotheses are refined, unless the score is above 0.04 or the
-    /// image does not decide among poses that look alike.
+    /// The doubt at which no further hypotheses are refined, unless the score is above 0.04. If the
+    /// image does not decide among poses that look alike, the score must be at most 0.005.
     pub good_enough: f64,
     /// The gain by which a hypothesis must beat a local pose near the initial pose.
     ///
